@@ -1,0 +1,54 @@
+// DDS files with a DX10 header that hold one BC6H texture and its mip chain. Byte table:
+// FORMATS.md.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/bc6h.h"
+
+namespace patina {
+
+inline constexpr int kDdsHeaderBytes = 148;
+inline constexpr int kMaxDdsSide = 65536;
+
+struct DdsTexture {
+  bc6h::Format format = bc6h::Format::kUf16;
+  int width = 0;  // of level 0, texels
+  int height = 0;
+  // levels[l]: blocks of the level of DdsLevelSide(width, l) x DdsLevelSide(height, l) texels,
+  // row-major, DdsBlocks(side) across and down. Texels of a block beyond the edge mean nothing.
+  std::vector<std::vector<bc6h::Block>> levels;
+};
+
+inline int DdsLevelSide(int side, int level) {
+  return level < 31 && (side >> level) > 1 ? side >> level : 1;
+}
+inline int DdsBlocks(int side) { return (side + 3) / 4; }
+// Levels of the chain down to 1x1. Sides >= 1.
+int DdsFullChainLevels(int width, int height);
+
+// The bytes of a file: the 148-byte header, then the levels, largest first.
+// Errors: kInvalidArgument (sizes below 1 or above kMaxDdsSide, no level, more levels than the full
+// chain, a level with a wrong number of blocks, a level 0 of 4 GiB or more).
+Result<std::vector<uint8_t>> EncodeDds(bc6h::Format format, int width, int height,
+                                       std::span<const std::vector<bc6h::Block>> levels);
+
+// Reads what EncodeDds writes, and the same kind of file from other tools (flags and linear size
+// are not checked). Errors: kCorruptData, with a message that starts with "bad magic", "bad
+// header", "truncated" or "trailing bytes"; kUnsupported for another format, a volume, a cube map
+// or an array.
+Result<DdsTexture> ParseDds(std::span<const uint8_t> bytes);
+
+// The same for files; errors name the file. Reading refuses files above max_bytes with kOutOfRange.
+Status WriteDds(const std::string& path, bc6h::Format format, int width, int height,
+                std::span<const std::vector<bc6h::Block>> levels);
+Result<DdsTexture> ReadDds(const std::string& path, uint64_t max_bytes = uint64_t{8} << 30);
+
+// The texels of a level as bits of halves: [y][x][rgb], row-major.
+std::vector<uint16_t> DecodeDdsLevel(const DdsTexture& texture, int level);
+
+}  // namespace patina

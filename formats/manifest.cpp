@@ -1,0 +1,441 @@
+#include "formats/manifest.h"
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "formats/dds.h"
+#include "formats/json_view.h"
+#include "formats/manifest_check.h"
+
+namespace patina {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr const char* kFormatName = "patina-container";
+
+// A double that prints with the digits of the float and reads back as the same float.
+double FloatAsWritten(float value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  double written = 0;
+  std::from_chars(text, end, written);
+  return static_cast<float>(written) == value ? written : static_cast<double>(value);
+}
+
+ordered_json NullIfInfinite(double value) {
+  return std::isinf(value) ? ordered_json(nullptr) : ordered_json(value);
+}
+
+ordered_json SourceToJson(const ManifestSource& source) {
+  ordered_json json;
+  json["width"] = source.width;
+  json["height"] = source.height;
+  json["levels"] = source.levels;
+  json["address"] = source.address;
+  json["normal_convention"] = source.normal_convention;
+  json["files"] = ordered_json::array();
+  for (const ManifestSourceFile& file : source.files) {
+    ordered_json entry;
+    entry["path"] = file.path;
+    entry["roles"] = file.roles;
+    entry["sha256"] = file.sha256;
+    entry["width"] = file.width;
+    entry["height"] = file.height;
+    entry["channels"] = file.channels;
+    entry["type"] = file.type;
+    entry["file_format"] = file.file_format;
+    json["files"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+ordered_json PayloadsToJson(const std::vector<ManifestPayload>& payloads) {
+  ordered_json json = ordered_json::array();
+  for (const ManifestPayload& payload : payloads) {
+    ordered_json entry;
+    entry["name"] = payload.name;
+    entry["role"] = payload.role;
+    entry["bytes"] = payload.bytes;
+    entry["sha256"] = payload.sha256;
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+ordered_json FeaturesToJson(const std::vector<ManifestFeature>& features) {
+  ordered_json json = ordered_json::array();
+  for (const ManifestFeature& feature : features) {
+    ordered_json entry;
+    entry["payload"] = feature.payload;
+    entry["width"] = feature.width;
+    entry["height"] = feature.height;
+    entry["levels"] = feature.levels;
+    entry["lod_bias"] = feature.lod_bias;
+    entry["format"] = feature.format;
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+ordered_json NetworkToJson(const ManifestNetwork& network) {
+  ordered_json json;
+  json["payload"] = network.payload;
+  json["inputs"] = network.inputs;
+  json["hidden"] = network.hidden;
+  json["outputs"] = network.outputs;
+  json["activation"] = network.activation;
+  return json;
+}
+
+ordered_json ChannelsToJson(const std::vector<ManifestChannel>& channels) {
+  ordered_json json = ordered_json::array();
+  for (const ManifestChannel& channel : channels) {
+    ordered_json entry;
+    entry["map"] = channel.map;
+    entry["component"] = channel.component;
+    entry["encoding"] = channel.encoding;
+    entry["range"] = {FloatAsWritten(channel.range_min), FloatAsWritten(channel.range_max)};
+    if (channel.output >= 0) {
+      entry["output"] = channel.output;
+    } else {
+      entry["constant"] = FloatAsWritten(channel.constant);
+    }
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+ordered_json MapsToJson(const std::vector<ManifestMap>& maps) {
+  ordered_json json = ordered_json::array();
+  for (const ManifestMap& map : maps) {
+    ordered_json entry;
+    entry["role"] = map.role;
+    entry["file"] = map.file;
+    entry["file_channels"] = map.file_channels;
+    entry["type"] = map.type;
+    entry["inverted"] = map.inverted;
+    entry["transfer"] = map.transfer;
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+ordered_json MeasuresToJson(const ManifestMeasures& measures) {
+  ordered_json json = ordered_json::object();
+  if (measures.psnr_db) json["psnr_db"] = NullIfInfinite(*measures.psnr_db);
+  if (measures.ssim) json["ssim"] = *measures.ssim;
+  if (measures.flip) json["flip"] = *measures.flip;
+  if (measures.normal_deg) json["normal_deg"] = *measures.normal_deg;
+  return json;
+}
+
+ordered_json QualityToJson(const ManifestQuality& quality) {
+  ordered_json json;
+  json["psnr_db"]["overall"] = NullIfInfinite(quality.psnr_overall_db);
+  json["psnr_db"]["mip0"] = NullIfInfinite(quality.psnr_mip0_db);
+  json["psnr_db"]["mean_mips"] = NullIfInfinite(quality.psnr_mean_mips_db);
+  if (quality.ssim) json["ssim"] = *quality.ssim;
+  if (quality.flip) json["flip"] = *quality.flip;
+  json["maps"] = ordered_json::array();
+  for (const ManifestMapQuality& map : quality.maps) {
+    ordered_json entry;
+    entry["map"] = map.map;
+    entry["overall"] = MeasuresToJson(map.overall);
+    entry["mips"] = ordered_json::array();
+    for (const ManifestMeasures& mip : map.mips) entry["mips"].push_back(MeasuresToJson(mip));
+    json["maps"].push_back(std::move(entry));
+  }
+  if (quality.gate_min_psnr_db) {
+    json["gate"]["min_psnr_db"] = *quality.gate_min_psnr_db;
+    json["gate"]["met"] = quality.gate_met;
+  }
+  return json;
+}
+
+ordered_json TrainingToJson(const ManifestTraining& training) {
+  ordered_json json;
+  json["samples"] = training.samples;
+  json["stopped_by"] = training.stopped_by;
+  json["float_psnr_db"]["mip0"] = NullIfInfinite(training.float_psnr_mip0_db);
+  json["float_psnr_db"]["mean_mips"] = NullIfInfinite(training.float_psnr_mean_mips_db);
+  json["rollbacks"] = training.rollbacks;
+  json["curve"] = ordered_json::array();
+  for (const ManifestCurvePoint& point : training.curve) {
+    ordered_json entry;
+    entry["samples"] = point.samples;
+    entry["psnr_mip0_db"] = NullIfInfinite(point.psnr_mip0_db);
+    entry["psnr_mean_mips_db"] = NullIfInfinite(point.psnr_mean_mips_db);
+    json["curve"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+constexpr size_t kMaxEntries = 65536;
+
+ManifestSource ReadSource(const JsonView& json) {
+  ManifestSource source;
+  source.width = json.Field("width").Int(1, kMaxDdsSide);
+  source.height = json.Field("height").Int(1, kMaxDdsSide);
+  source.levels = json.Field("levels").Int(1, 32);
+  source.address = json.Field("address").String();
+  source.normal_convention = json.Field("normal_convention").String();
+  json.Field("files").ForEach(kMaxEntries, [&](const JsonView& entry) {
+    ManifestSourceFile file;
+    file.path = entry.Field("path").String();
+    entry.Field("roles").ForEach(
+        kMaxEntries, [&](const JsonView& role) { file.roles.push_back(role.String()); });
+    file.sha256 = entry.Field("sha256").String();
+    file.width = entry.Field("width").Int(1, kMaxDdsSide);
+    file.height = entry.Field("height").Int(1, kMaxDdsSide);
+    file.channels = entry.Field("channels").Int(1, 1024);
+    file.type = entry.Field("type").String();
+    file.file_format = entry.Field("file_format").String();
+    source.files.push_back(std::move(file));
+  });
+  return source;
+}
+
+void ReadPayloads(const JsonView& json, std::vector<ManifestPayload>* payloads) {
+  json.ForEach(kMaxEntries, [&](const JsonView& entry) {
+    ManifestPayload payload;
+    payload.name = entry.Field("name").String();
+    payload.role = entry.Field("role").String();
+    payload.bytes = entry.Field("bytes").Unsigned();
+    payload.sha256 = entry.Field("sha256").String();
+    payloads->push_back(std::move(payload));
+  });
+}
+
+void ReadFeatures(const JsonView& json, std::vector<ManifestFeature>* features) {
+  json.ForEach(kMaxManifestFeatures, [&](const JsonView& entry) {
+    ManifestFeature feature;
+    feature.payload = entry.Field("payload").String();
+    feature.width = entry.Field("width").Int(1, kMaxDdsSide);
+    feature.height = entry.Field("height").Int(1, kMaxDdsSide);
+    feature.levels = entry.Field("levels").Int(1, 32);
+    feature.lod_bias = entry.Field("lod_bias").Int(-31, 0);
+    feature.format = entry.Field("format").String();
+    features->push_back(std::move(feature));
+  });
+}
+
+ManifestNetwork ReadNetwork(const JsonView& json) {
+  ManifestNetwork network;
+  network.payload = json.Field("payload").String();
+  network.inputs = json.Field("inputs").Int(1, 3 * kMaxManifestFeatures);
+  network.hidden = json.Field("hidden").Int(1, kMaxManifestHidden);
+  network.outputs = json.Field("outputs").Int(1, kMaxManifestOutputs);
+  network.activation = json.Field("activation").String();
+  return network;
+}
+
+void ReadChannels(const JsonView& json, JsonProblem* problem,
+                  std::vector<ManifestChannel>* channels) {
+  json.ForEach(2048, [&](const JsonView& entry) {
+    ManifestChannel channel;
+    channel.map = entry.Field("map").String();
+    channel.component = entry.Field("component").String();
+    channel.encoding = entry.Field("encoding").String();
+    std::vector<float> range;
+    entry.Field("range").ForEach(2, [&](const JsonView& bound) { range.push_back(bound.Float()); });
+    if (range.size() == 2) {
+      channel.range_min = range[0];
+      channel.range_max = range[1];
+    } else if (problem->text.empty()) {
+      problem->text = "/channels/" + std::to_string(channels->size()) + "/range: not two numbers";
+    }
+    if (const JsonView output = entry.Optional("output")) {
+      channel.output = output.Int(0, kMaxManifestOutputs - 1);
+    } else {
+      channel.constant = entry.Field("constant").Float();
+    }
+    channels->push_back(std::move(channel));
+  });
+}
+
+void ReadMaps(const JsonView& json, std::vector<ManifestMap>* maps) {
+  json.ForEach(kMaxEntries, [&](const JsonView& entry) {
+    ManifestMap map;
+    map.role = entry.Field("role").String();
+    map.file = entry.Field("file").Int(-1, kMaxEntries);
+    entry.Field("file_channels").ForEach(1024, [&](const JsonView& channel) {
+      map.file_channels.push_back(channel.Int(0, 1023));
+    });
+    map.type = entry.Field("type").String();
+    map.inverted = entry.Field("inverted").Bool();
+    map.transfer = entry.Field("transfer").String();
+    maps->push_back(std::move(map));
+  });
+}
+
+std::optional<double> ReadOptionalNumber(const JsonView& json) {
+  return json ? std::optional<double>(json.Number()) : std::nullopt;
+}
+
+ManifestMeasures ReadMeasures(const JsonView& json) {
+  ManifestMeasures measures;
+  if (const JsonView psnr = json.Optional("psnr_db")) measures.psnr_db = psnr.NumberOrInfinity();
+  measures.ssim = ReadOptionalNumber(json.Optional("ssim"));
+  measures.flip = ReadOptionalNumber(json.Optional("flip"));
+  measures.normal_deg = ReadOptionalNumber(json.Optional("normal_deg"));
+  return measures;
+}
+
+ManifestQuality ReadQuality(const JsonView& json) {
+  ManifestQuality quality;
+  const JsonView psnr = json.Field("psnr_db");
+  quality.psnr_overall_db = psnr.Field("overall").NumberOrInfinity();
+  quality.psnr_mip0_db = psnr.Field("mip0").NumberOrInfinity();
+  quality.psnr_mean_mips_db = psnr.Field("mean_mips").NumberOrInfinity();
+  quality.ssim = ReadOptionalNumber(json.Optional("ssim"));
+  quality.flip = ReadOptionalNumber(json.Optional("flip"));
+  json.Field("maps").ForEach(kMaxEntries, [&](const JsonView& entry) {
+    ManifestMapQuality map;
+    map.map = entry.Field("map").String();
+    map.overall = ReadMeasures(entry.Field("overall"));
+    entry.Field("mips").ForEach(
+        32, [&](const JsonView& mip) { map.mips.push_back(ReadMeasures(mip)); });
+    quality.maps.push_back(std::move(map));
+  });
+  if (const JsonView gate = json.Optional("gate")) {
+    quality.gate_min_psnr_db = gate.Field("min_psnr_db").Number();
+    quality.gate_met = gate.Field("met").Bool();
+  }
+  return quality;
+}
+
+ManifestTraining ReadTraining(const JsonView& json) {
+  ManifestTraining training;
+  training.samples = json.Field("samples").Unsigned();
+  training.stopped_by = json.Field("stopped_by").String();
+  const JsonView psnr = json.Field("float_psnr_db");
+  training.float_psnr_mip0_db = psnr.Field("mip0").NumberOrInfinity();
+  training.float_psnr_mean_mips_db = psnr.Field("mean_mips").NumberOrInfinity();
+  training.rollbacks = json.Field("rollbacks").Int(0, std::numeric_limits<int>::max());
+  json.Field("curve").ForEach(kMaxEntries, [&](const JsonView& entry) {
+    ManifestCurvePoint point;
+    point.samples = entry.Field("samples").Unsigned();
+    point.psnr_mip0_db = entry.Field("psnr_mip0_db").NumberOrInfinity();
+    point.psnr_mean_mips_db = entry.Field("psnr_mean_mips_db").NumberOrInfinity();
+    training.curve.push_back(point);
+  });
+  return training;
+}
+
+Status CheckVersion(const JsonView& json, const JsonProblem& problem) {
+  const std::string format = json.Field("format").String();
+  if (problem.text.empty() && format != kFormatName) {
+    return Fail(ErrorCode::kUnsupported,
+                "/format: " + QuoteForMessage(format) + " is not \"patina-container\"");
+  }
+  const int version = json.Field("format_version").Int(1, std::numeric_limits<int>::max());
+  if (!problem.text.empty()) return Fail(ErrorCode::kCorruptData, problem.text);
+  if (version > kManifestVersion) {
+    return Fail(ErrorCode::kUnsupported, "/format_version: " + std::to_string(version) +
+                                             " is newer than this program, which reads up to " +
+                                             std::to_string(kManifestVersion) +
+                                             "; use a newer patina");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> ToJson(const Manifest& manifest) {
+  if (auto status = CheckManifest(manifest); !status) {
+    return Fail(ErrorCode::kInvalidArgument, std::move(status).error().message);
+  }
+  ordered_json json;
+  json["format"] = kFormatName;
+  json["format_version"] = kManifestVersion;
+  json["kind"] = manifest.kind;
+  json["asset"] = manifest.asset;
+  json["tool"]["name"] = manifest.tool.name;
+  json["tool"]["version"] = manifest.tool.version;
+  json["tool"]["recipe"] = manifest.tool.recipe;
+  json["tool"]["recipe_version"] = manifest.tool.recipe_version;
+  json["fingerprint"] = manifest.fingerprint;
+  json["seed"] = manifest.seed;
+  json["profile"] = manifest.profile;
+  json["quality_setting"] = manifest.quality_setting;
+  json["source"] = SourceToJson(manifest.source);
+  json["payloads"] = PayloadsToJson(manifest.payloads);
+  json["features"] = FeaturesToJson(manifest.features);
+  if (manifest.network) json["network"] = NetworkToJson(*manifest.network);
+  json["channels"] = ChannelsToJson(manifest.channels);
+  json["maps"] = MapsToJson(manifest.maps);
+  json["color"]["working_space"] = manifest.working_space;
+  json["quality"] = QualityToJson(manifest.quality);
+  json["training"] = TrainingToJson(manifest.training);
+  json["left_out"] = ordered_json::array();
+  for (const ManifestLeftOut& left_out : manifest.left_out) {
+    ordered_json entry;
+    entry["what"] = left_out.what;
+    entry["reason"] = left_out.reason;
+    entry["saved"] = left_out.saved;
+    json["left_out"].push_back(std::move(entry));
+  }
+  json["warnings"] = manifest.warnings;
+  std::string text = json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+  // What is written must be readable: this also finds strings and lists above the reader's limits.
+  if (auto read_back = ParseManifest(text); !read_back) {
+    return Fail(ErrorCode::kInvalidArgument, std::move(read_back).error().message);
+  }
+  return text;
+}
+
+Result<Manifest> ParseManifest(std::string_view text) {
+  if (text.size() > kMaxManifestBytes) {
+    return Fail(ErrorCode::kCorruptData, "a manifest of " + std::to_string(text.size()) +
+                                             " bytes, more than " +
+                                             std::to_string(kMaxManifestBytes));
+  }
+  nlohmann::json document;
+  try {
+    document = nlohmann::json::parse(text);
+  } catch (const nlohmann::json::exception& error) {
+    return Fail(ErrorCode::kCorruptData, std::string("not JSON: ") + error.what());
+  }
+  JsonProblem problem;
+  const JsonView json(&document, &problem);
+  PATINA_TRY(CheckVersion(json, problem));
+  Manifest manifest;
+  manifest.kind = json.Field("kind").String();
+  manifest.asset = json.Field("asset").String();
+  const JsonView tool = json.Field("tool");
+  manifest.tool.name = tool.Field("name").String();
+  manifest.tool.version = tool.Field("version").String();
+  manifest.tool.recipe = tool.Field("recipe").String();
+  manifest.tool.recipe_version = tool.Field("recipe_version").Int(1, 1000000);
+  manifest.fingerprint = json.Field("fingerprint").String();
+  manifest.seed = json.Field("seed").Unsigned();
+  manifest.profile = json.Field("profile").String();
+  manifest.quality_setting = json.Field("quality_setting").String();
+  manifest.source = ReadSource(json.Field("source"));
+  ReadPayloads(json.Field("payloads"), &manifest.payloads);
+  ReadFeatures(json.Field("features"), &manifest.features);
+  if (const JsonView network = json.Optional("network")) manifest.network = ReadNetwork(network);
+  ReadChannels(json.Field("channels"), &problem, &manifest.channels);
+  ReadMaps(json.Field("maps"), &manifest.maps);
+  manifest.working_space = json.Field("color").Field("working_space").String();
+  manifest.quality = ReadQuality(json.Field("quality"));
+  manifest.training = ReadTraining(json.Field("training"));
+  json.Field("left_out").ForEach(kMaxEntries, [&](const JsonView& entry) {
+    manifest.left_out.push_back({entry.Field("what").String(), entry.Field("reason").String(),
+                                 entry.Field("saved").String()});
+  });
+  json.Field("warnings").ForEach(kMaxEntries, [&](const JsonView& warning) {
+    manifest.warnings.push_back(warning.String());
+  });
+  if (!problem.text.empty()) return Fail(ErrorCode::kCorruptData, problem.text);
+  if (auto status = CheckManifest(manifest); !status) {
+    Error error = std::move(status).error();
+    if (error.code == ErrorCode::kInvalidArgument) error.code = ErrorCode::kCorruptData;
+    return Fail(std::move(error));
+  }
+  return manifest;
+}
+
+}  // namespace patina

@@ -1,0 +1,191 @@
+// manifest.json: what a container is, how to decode it, where it came from and how good it is.
+//
+// The fields are described one by one in FORMATS.md; schemas/manifest.schema.json is the formal
+// description. Names that are a closed set in the file are strings here, because readers of a newer
+// version may meet new ones.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "formats/base/result.h"
+
+namespace patina {
+
+inline constexpr int kManifestVersion = 1;
+inline constexpr size_t kMaxManifestBytes = size_t{8} << 20;  // readers refuse larger files
+inline constexpr int kMaxManifestFeatures = 16;
+inline constexpr int kMaxManifestHidden = 256;
+inline constexpr int kMaxManifestOutputs = 256;
+
+struct ManifestTool {
+  std::string name = "patina";
+  std::string version;            // of the program, e.g. "0.1.0"
+  std::string recipe = "patina";  // "patina" or "paper"
+  int recipe_version = 1;         // raised when the same job would give other bytes
+};
+
+// One image file of the source set.
+struct ManifestSourceFile {
+  std::string path;                // relative to the input folder, '/' between folders, UTF-8
+  std::vector<std::string> roles;  // what it was used for; empty if nothing
+  std::string sha256;              // 64 lower-case hex digits
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  std::string type;         // "uint8", "uint16", "uint32", "half", "float", "double"
+  std::string file_format;  // OpenImageIO's name of the format: "png", "jpeg", "openexr", ...
+};
+
+struct ManifestSource {
+  int width = 0;  // of mip 0 of the material
+  int height = 0;
+  int levels = 0;  // of the full chain down to 1x1
+  std::string address =
+      "wrap";  // "wrap" or "clamp": beyond the edge, for features and source alike
+  std::string normal_convention =
+      "opengl";  // of the source's files: "opengl" (Y up) or "directx" (Y down)
+  std::vector<ManifestSourceFile> files;
+};
+
+// A file of the container. manifest.json itself and files that differ from run to run (run.json)
+// are not listed.
+struct ManifestPayload {
+  std::string name;  // a plain file name in the container's directory
+  std::string role;  // "features", "weights", "preview", "report"
+  uint64_t bytes = 0;
+  std::string sha256;
+};
+
+// One feature texture; three consecutive inputs of the network, in the order of the array.
+struct ManifestFeature {
+  std::string payload;  // name of a payload of role "features"
+  int width = 0;        // of its level 0
+  int height = 0;
+  int levels = 0;
+  int lod_bias = 0;  // added to s to get the level; 0 or negative
+  std::string format = "BC6H_UF16";
+};
+
+// outputs = W2 relu(W1 inputs + b1) + b2
+struct ManifestNetwork {
+  std::string payload;  // name of the payload of role "weights"
+  int inputs = 12;
+  int hidden = 16;
+  int outputs = 0;
+  std::string activation = "relu";
+};
+
+// One channel of the material; channels of one map are contiguous.
+struct ManifestChannel {
+  std::string map;  // role: "albedo", "normal", "ao", "roughness", "metalness", "displacement", ...
+  std::string component;  // "r", "g", "b", "x", "y", or "" for a map of one channel
+  std::string encoding =
+      "linear";         // "linear", "srgb" or "normal_xy": coded value -> physical value
+  float range_min = 0;  // coded; decoders clamp to it
+  float range_max = 1;
+  int output = -1;     // output of the network, or -1 for a constant
+  float constant = 0;  // coded; used when output < 0
+};
+
+// How a map was stored in the source, so that it can be written back the same way.
+struct ManifestMap {
+  std::string role;
+  int file = -1;  // index into source.files, or -1 if the map has no file of its own
+  std::vector<int>
+      file_channels;      // channels of that file, 0-based, in the order of the map's components
+  std::string type;       // as ManifestSourceFile::type
+  bool inverted = false;  // the file holds 1 - value (glossiness for roughness)
+  std::string transfer = "linear";  // "linear" or "srgb": what the file's numbers are
+};
+
+// Measures of a map, at one mip or over all. Absent if not measured; infinity (written as null) for
+// a PSNR without error.
+struct ManifestMeasures {
+  std::optional<double> psnr_db;
+  std::optional<double> ssim;
+  std::optional<double> flip;
+  std::optional<double> normal_deg;  // mean angle between normals
+};
+
+struct ManifestMapQuality {
+  std::string map;
+  ManifestMeasures overall;            // over all mips
+  std::vector<ManifestMeasures> mips;  // mip 0 first
+};
+
+struct ManifestQuality {
+  // Learned channels, coded values, decoded from the written payloads. Infinity (null) without
+  // error.
+  double psnr_overall_db = 0;  // of the mean squared error over all channels and mips
+  double psnr_mip0_db = 0;
+  double psnr_mean_mips_db = 0;  // mean over mips of the PSNR of each
+  std::optional<double> ssim;
+  std::optional<double> flip;
+  std::vector<ManifestMapQuality> maps;
+  std::optional<double> gate_min_psnr_db;  // the gate asked for, if any
+  bool gate_met = true;
+};
+
+struct ManifestCurvePoint {
+  uint64_t samples = 0;
+  double psnr_mip0_db = 0;
+  double psnr_mean_mips_db = 0;
+};
+
+struct ManifestTraining {
+  uint64_t samples = 0;
+  std::string
+      stopped_by;  // "budget", "slope", "target", "time", or "none" when nothing had to be learned
+  double float_psnr_mip0_db = 0;  // of the trainer's own float model: what the export cost
+  double float_psnr_mean_mips_db = 0;
+  int rollbacks = 0;
+  std::vector<ManifestCurvePoint> curve;
+};
+
+struct ManifestLeftOut {
+  std::string what;    // e.g. "metalness"
+  std::string reason;  // e.g. "constant 0"
+  std::string saved;   // e.g. "1 network output"
+};
+
+struct Manifest {
+  // format "patina-container" and format_version kManifestVersion are written by ToJson and checked
+  // by ParseManifest.
+  std::string kind = "material";
+  std::string asset;
+  ManifestTool tool;
+  std::string fingerprint;  // hex SHA-256 of recipe, job and input hashes
+  uint64_t seed = 1;        // below 2^63, which is as far as JSON Schema validators count
+  std::string profile;      // "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"
+  std::string quality_setting = "standard";  // "preview", "standard", "reference"
+  ManifestSource source;
+  std::vector<ManifestPayload> payloads;
+  std::vector<ManifestFeature> features;   // empty when every channel is constant
+  std::optional<ManifestNetwork> network;  // likewise
+  std::vector<ManifestChannel> channels;
+  std::vector<ManifestMap> maps;
+  std::string working_space = "lin_rec709";  // of physical colour values
+  ManifestQuality quality;
+  ManifestTraining training;
+  std::vector<ManifestLeftOut> left_out;
+  std::vector<std::string> warnings;
+};
+
+// The canonical text: fixed key order, 2-space indent, LF, a final newline, shortest decimals that
+// read back exactly. The same manifest gives the same bytes. Text that is not UTF-8 has its bad
+// bytes replaced by U+FFFD. Errors: kInvalidArgument with a JSON pointer for anything that
+// ParseManifest would refuse.
+Result<std::string> ToJson(const Manifest& manifest);
+
+// Reads a manifest of any version written so far; ignores fields it does not know.
+// Errors, with JSON pointers: kCorruptData (not JSON, wrong type, missing field, value outside its
+// range, references to payloads, files or outputs that are not there), kUnsupported (a newer
+// format_version, another format or kind).
+Result<Manifest> ParseManifest(std::string_view text);
+
+}  // namespace patina
