@@ -1,0 +1,473 @@
+#include "pipeline/material/reference.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <utility>
+
+#include "pipeline/color/color.h"
+#include "pipeline/image/resize.h"
+#include "pipeline/material/map_plan.h"
+#include "pipeline/material/mip_filter.h"
+#include "pipeline/material/source_maps.h"
+
+namespace patina {
+namespace {
+
+struct Range {
+  float low = std::numeric_limits<float>::infinity();
+  float high = -std::numeric_limits<float>::infinity();
+  void Add(const float* values, int count) {
+    float l = low, h = high;
+    for (int i = 0; i < count; ++i) {
+      l = values[i] < l ? values[i] : l;
+      h = values[i] > h ? values[i] : h;
+    }
+    low = l;
+    high = h;
+  }
+  void Add(const Range& other) {
+    low = std::min(low, other.low);
+    high = std::max(high, other.high);
+  }
+};
+
+std::string Percent(uint64_t part, uint64_t whole) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f %%",
+                100.0 * static_cast<double>(part) / static_cast<double>(whole));
+  return text;
+}
+
+// Turns loaded maps into the pyramid, mip by mip.
+class Builder {
+ public:
+  Builder(SourceMaps maps, const ReferenceOptions& options, ThreadPool& pool,
+          ProgressSink& progress)
+      : options_(options),
+        pool_(pool),
+        progress_(progress),
+        started_(Clock::now()),
+        files_(std::move(maps.files)),
+        plans_(std::move(maps.plans)) {
+    result_.width = maps.width;
+    result_.height = maps.height;
+    result_.files = std::move(maps.descriptions);
+    result_.notes = std::move(maps.notes);
+    result_.warnings = std::move(maps.warnings);
+  }
+
+  Result<SourceReference> Run() {
+    Report(0);
+    MeasureMip0();
+    DescribeChannels();
+    DescribeMaps();
+    PATINA_TRY(BuildMips());
+    Report(1);
+    return std::move(result_);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void Report(double fraction) {
+    ProgressEvent event;
+    event.stage = "reference";
+    event.fraction = fraction;
+    event.elapsed_s = std::chrono::duration<double>(Clock::now() - started_).count();
+    progress_.OnProgress(event);
+  }
+
+  void Warn(const std::string& warning) {
+    result_.warnings.push_back(warning);
+    progress_.OnWarning(warning);
+  }
+
+  // Codes of a row of one map as they are learned. For normals, planes hold the vector and are not
+  // touched.
+  static void EncodeNormal(const float* component, int count, float* coded) {
+    for (int x = 0; x < count; ++x) coded[x] = 0.5f + 0.5f * component[x];
+  }
+
+  // Scratch of each worker: the rows of one map and one coded row.
+  struct Scratch {
+    std::array<std::vector<float>, 3> rows;
+    std::vector<float> coded;
+    std::array<float*, 3> planes{};
+  };
+  std::vector<Scratch> MakeScratch(int width) const {
+    std::vector<Scratch> all(pool_.threads());
+    for (Scratch& scratch : all) {
+      for (int i = 0; i < 3; ++i) {
+        scratch.rows[i].resize(width);
+        scratch.planes[i] = scratch.rows[i].data();
+      }
+      scratch.coded.resize(static_cast<size_t>((width + 15) / 16 + TargetLevel::kPadBlocks) * 16);
+    }
+    return all;
+  }
+
+  // Ranges of the coded channels of mip 0, and the coverage of opacity.
+  void MeasureMip0() {
+    int components = 0;
+    for (const MapPlan& plan : plans_) components += plan.components();
+    const int height = result_.height, width = result_.width;
+    constexpr int kRowsPerTask = 16;
+    const int tasks = (height + kRowsPerTask - 1) / kRowsPerTask;
+    std::vector<Range> ranges(static_cast<size_t>(tasks) * components);
+    std::vector<NormalDefects> defects(static_cast<size_t>(tasks) * plans_.size());
+    std::vector<uint64_t> visible(tasks, 0);
+    std::vector<Scratch> scratch = MakeScratch(width);
+    pool_.ParallelFor(tasks, [&](int task, int worker) {
+      Scratch& s = scratch[worker];
+      const int end = std::min(height, (task + 1) * kRowsPerTask);
+      Range* range = &ranges[static_cast<size_t>(task) * components];
+      for (size_t p = 0; p < plans_.size(); ++p) {
+        const MapPlan& plan = plans_[p];
+        for (int y = task * kRowsPerTask; y < end; ++y) {
+          LoadMapRow(plan, files_[plan.file], width, y, s.planes.data(),
+                     &defects[task * plans_.size() + p]);
+          for (int c = 0; c < plan.components(); ++c) {
+            const float* coded = s.planes[c];
+            if (plan.encoding == Encoding::kNormalXy) {
+              EncodeNormal(coded, width, s.coded.data());
+              coded = s.coded.data();
+            }
+            range[c].Add(coded, width);
+          }
+          if (IsOpacity(plan)) {
+            for (int x = 0; x < width; ++x) visible[task] += s.planes[0][x] >= kOpacityCutoff;
+          }
+        }
+        range += plan.components();
+      }
+    });
+    ranges_.assign(components, Range());
+    for (size_t i = 0; i < ranges.size(); ++i) ranges_[i % components].Add(ranges[i]);
+    const uint64_t texels = static_cast<uint64_t>(width) * height;
+    uint64_t total_visible = 0;
+    for (const uint64_t count : visible) total_visible += count;
+    coverage_ = static_cast<double>(total_visible) / static_cast<double>(texels);
+    for (size_t p = 0; p < plans_.size(); ++p) {
+      NormalDefects total;
+      for (int task = 0; task < tasks; ++task) {
+        total.undefined += defects[task * plans_.size() + p].undefined;
+        total.below += defects[task * plans_.size() + p].below;
+      }
+      const std::string& name = result_.files[plans_[p].file].file;
+      if (total.undefined > 0) {
+        Warn(name + ": " + std::to_string(total.undefined) + " normals (" +
+             Percent(total.undefined, texels) + ") have no direction and count as (0, 0, 1).");
+      }
+      if (total.below > 0) {
+        Warn(name + ": " + std::to_string(total.below) + " normals (" +
+             Percent(total.below, texels) + ") point below the surface and are raised to it.");
+      }
+    }
+  }
+
+  static bool IsOpacity(const MapPlan& plan) {
+    return std::strcmp(plan.role->name, "opacity") == 0;
+  }
+
+  void DescribeChannels() {
+    size_t index = 0;
+    int learned = 0;
+    for (const MapPlan& plan : plans_) {
+      for (int c = 0; c < plan.components(); ++c, ++index) {
+        TargetChannel channel;
+        channel.map = plan.role->name;
+        channel.component = ComponentName(plan.role->kind, c);
+        channel.encoding = plan.encoding;
+        channel.min_value = ranges_[index].low;
+        channel.max_value = ranges_[index].high;
+        channel.constant = channel.min_value == channel.max_value;
+        if (channel.constant) channel.constant_value = channel.min_value;
+        channel.learned_index = channel.constant ? -1 : learned++;
+        result_.material.channels.push_back(std::move(channel));
+      }
+    }
+    TargetPyramid& pyramid = result_.material.pyramid;
+    pyramid.channels = learned;
+    pyramid.address = options_.address;
+    int width = result_.width, height = result_.height;
+    for (;;) {
+      TargetLevel level;
+      level.Allocate(width, height, learned);
+      pyramid.levels.push_back(std::move(level));
+      if (width == 1 && height == 1) break;
+      width = NextMipSide(width);
+      height = NextMipSide(height);
+    }
+  }
+
+  void DescribeMaps() {
+    for (const MapPlan& plan : plans_) {
+      const LoadedFile& file = files_[plan.file];
+      ReferenceMap map;
+      map.role = plan.role->name;
+      map.file = plan.file;
+      map.file_channels.assign(plan.channels.begin(), plan.channels.begin() + plan.components());
+      map.type = result_.files[plan.file].type;
+      map.inverted = plan.invert;
+      map.srgb = plan.srgb;
+      map.convention = plan.convention;
+      map.resized = file.resized;
+      result_.maps.push_back(std::move(map));
+    }
+  }
+
+  // Where the planes and channels of a map are.
+  struct Place {
+    int channel = 0;  // in material.channels, of the first component
+    int plane = -1;   // of the working levels, or -1 when no component is learned
+  };
+
+  std::vector<Place> MakePlaces(int* planes) const {
+    std::vector<Place> places;
+    int channel = 0;
+    *planes = 0;
+    for (const MapPlan& plan : plans_) {
+      Place place;
+      place.channel = channel;
+      bool learned = false;
+      for (int c = 0; c < plan.components(); ++c) learned |= Learned(channel + c) >= 0;
+      if (learned) {
+        place.plane = *planes;
+        *planes += plan.work_planes();
+      }
+      places.push_back(place);
+      channel += plan.components();
+    }
+    return places;
+  }
+
+  int Learned(int channel) const { return result_.material.channels[channel].learned_index; }
+
+  // Writes a row of one channel, columns beyond the edge included. `coded` has room for all blocks
+  // of the row.
+  void StoreRow(TargetLevel* level, int y, int channel, float* coded) const {
+    const int columns = level->row_blocks * 16;
+    for (int x = level->width; x < columns; ++x) {
+      coded[x] = options_.address == AddressMode::kWrap ? coded[x - level->width]
+                                                        : coded[level->width - 1];
+    }
+    float* to = level->data.data() +
+                (static_cast<size_t>(y) * level->row_blocks * level->channels + channel) * 16;
+    for (int block = 0; block < level->row_blocks; ++block) {
+      std::memcpy(to + static_cast<size_t>(block) * level->channels * 16, coded + block * 16,
+                  16 * sizeof(float));
+    }
+  }
+
+  Status BuildMips() {
+    int planes = 0;
+    const std::vector<Place> places = MakePlaces(&planes);
+    TargetPyramid& pyramid = result_.material.pyramid;
+    PlaneLevel level = BuildFirstLevels(places, planes);
+    files_.clear();
+    for (size_t mip = 1; mip < pyramid.levels.size(); ++mip) {
+      if (options_.cancel != nullptr && options_.cancel->cancelled()) {
+        return Fail(ErrorCode::kCancelled, "stopped while the reference was filtered");
+      }
+      if (mip > 1) level = NextLevel(level, pool_);
+      EncodeLevel(places, level, &pyramid.levels[mip]);
+      Report(static_cast<double>(mip) / static_cast<double>(pyramid.levels.size()));
+    }
+    return {};
+  }
+
+  // Writes mip 0 and returns the working values of mip 1, each row of which needs two or three rows
+  // of mip 0. Of three, the last is read again for the next row.
+  PlaneLevel BuildFirstLevels(const std::vector<Place>& places, int planes) {
+    TargetLevel& mip0 = result_.material.pyramid.levels[0];
+    const int width = result_.width, height = result_.height;
+    PlaneLevel next;
+    next.Allocate(NextMipSide(width), NextMipSide(height), planes);
+    std::vector<Scratch> scratch = MakeScratch(width);
+    pool_.ParallelFor(next.height, [&](int y, int worker) {
+      Scratch& s = scratch[worker];
+      NormalDefects ignored;
+      const BoxTaps taps = BoxTapsFor(height, y);
+      for (size_t p = 0; p < plans_.size(); ++p) {
+        const MapPlan& plan = plans_[p];
+        if (places[p].plane < 0) continue;
+        for (int tap = 0; tap < taps.count; ++tap) {
+          const int row = taps.first + tap;
+          LoadMapRow(plan, files_[plan.file], width, row, s.planes.data(), &ignored);
+          const bool mine = tap < 2 || y == next.height - 1;
+          for (int c = 0; c < plan.components() && mine; ++c) {
+            const int channel = Learned(places[p].channel + c);
+            if (channel < 0) continue;
+            if (plan.encoding == Encoding::kNormalXy) {
+              EncodeNormal(s.planes[c], width, s.coded.data());
+            } else {
+              std::copy_n(s.planes[c], width, s.coded.data());
+            }
+            StoreRow(&mip0, row, channel, s.coded.data());
+          }
+          for (int i = 0; i < plan.work_planes(); ++i) {
+            if (plan.encoding == Encoding::kSrgb) SrgbToLinearRow(s.planes[i], width, s.planes[i]);
+            AddBoxRow(s.planes[i], width, taps.weight[tap], next.Row(places[p].plane + i, y));
+          }
+        }
+      }
+    });
+    return next;
+  }
+
+  // Index of the plan whose normals widen the roughness of plan p, or -1.
+  int WideningNormals(size_t p, const std::vector<Place>& places) const {
+    if (!options_.widen_roughness) return -1;
+    const std::string role = plans_[p].role->name;
+    const char* wanted = role == "roughness"             ? "normal"
+                         : role == "clearcoat_roughness" ? "clearcoat_normal"
+                                                         : nullptr;
+    for (size_t other = 0; other < plans_.size() && wanted != nullptr; ++other) {
+      if (std::strcmp(plans_[other].role->name, wanted) == 0 && places[other].plane >= 0)
+        return static_cast<int>(other);
+    }
+    return -1;
+  }
+
+  void EncodeLevel(const std::vector<Place>& places, const PlaneLevel& level, TargetLevel* target) {
+    const int width = level.width;
+    std::vector<float> scales(plans_.size(), 1.0f);
+    std::vector<int> widening(plans_.size(), -1);
+    for (size_t p = 0; p < plans_.size(); ++p) {
+      if (places[p].plane < 0) continue;
+      widening[p] = WideningNormals(p, places);
+      if (IsOpacity(plans_[p])) {
+        const size_t texels = static_cast<size_t>(width) * level.height;
+        scales[p] =
+            CoverageScale({level.Row(places[p].plane, 0), texels}, coverage_, kOpacityCutoff);
+      }
+    }
+    const size_t channels = result_.material.channels.size();
+    std::vector<Range> ranges(channels * level.height);
+    std::vector<Scratch> scratch = MakeScratch(width);
+    pool_.ParallelFor(level.height, [&](int y, int worker) {
+      float* coded = scratch[worker].coded.data();
+      for (size_t p = 0; p < plans_.size(); ++p) {
+        const Place& place = places[p];
+        if (place.plane < 0) continue;
+        for (int c = 0; c < plans_[p].components(); ++c) {
+          if (Learned(place.channel + c) < 0) continue;
+          EncodeRow(p, c, level, y, place, scales[p],
+                    widening[p] < 0 ? -1 : places[widening[p]].plane, coded);
+          ranges[y * channels + place.channel + c].Add(coded, width);
+          StoreRow(target, y, Learned(place.channel + c), coded);
+        }
+      }
+    });
+    for (size_t i = 0; i < ranges.size(); ++i) {
+      TargetChannel& channel = result_.material.channels[i % channels];
+      if (channel.constant) continue;
+      channel.min_value = std::min(channel.min_value, ranges[i].low);
+      channel.max_value = std::max(channel.max_value, ranges[i].high);
+    }
+  }
+
+  // Working values of component c of a map to coded ones.
+  void EncodeRow(size_t p, int c, const PlaneLevel& level, int y, const Place& place, float scale,
+                 int normal_plane, float* coded) const {
+    const int width = level.width;
+    const float* in = level.Row(place.plane + c, y);
+    switch (plans_[p].encoding) {
+      case Encoding::kSrgb:
+        LinearToSrgbRow(in, width, coded);
+        return;
+      case Encoding::kNormalXy: {
+        const float* nx = level.Row(place.plane, y);
+        const float* ny = level.Row(place.plane + 1, y);
+        const float* nz = level.Row(place.plane + 2, y);
+        for (int x = 0; x < width; ++x) {
+          const float length = std::sqrt(nx[x] * nx[x] + ny[x] * ny[x] + nz[x] * nz[x]);
+          // Normals that cancel out leave a flat surface.
+          coded[x] = length > 1e-6f ? 0.5f + 0.5f * (in[x] / length) : 0.5f;
+        }
+        return;
+      }
+      case Encoding::kLinear:
+        break;
+    }
+    if (normal_plane >= 0) {
+      const float* nx = level.Row(normal_plane, y);
+      const float* ny = level.Row(normal_plane + 1, y);
+      const float* nz = level.Row(normal_plane + 2, y);
+      for (int x = 0; x < width; ++x) {
+        coded[x] = WidenRoughness(in[x], std::sqrt(nx[x] * nx[x] + ny[x] * ny[x] + nz[x] * nz[x]));
+      }
+    } else if (scale != 1.0f) {
+      for (int x = 0; x < width; ++x) coded[x] = std::min(1.0f, in[x] * scale);
+    } else {
+      std::copy_n(in, width, coded);
+    }
+  }
+
+  const ReferenceOptions& options_;
+  ThreadPool& pool_;
+  ProgressSink& progress_;
+  Clock::time_point started_;
+  std::vector<LoadedFile> files_;
+  std::vector<MapPlan> plans_;
+  std::vector<Range> ranges_;  // of mip 0, one for each component of each plan
+  double coverage_ = 0;        // of opacity on mip 0
+  SourceReference result_;
+};
+
+int Address(int i, int size, AddressMode mode) {
+  if (mode == AddressMode::kClamp) return std::clamp(i, 0, size - 1);
+  const int rest = i % size;
+  return rest < 0 ? rest + size : rest;
+}
+
+// Adds weight times the bicubic value of one level at (u, v).
+void AddLevel(const TargetLevel& level, AddressMode mode, double u, double v, double weight,
+              double* out) {
+  const double x = u * level.width - 0.5, y = v * level.height - 0.5;
+  const double x0 = std::floor(x), y0 = std::floor(y);
+  double wx[4], wy[4];
+  CatmullRomWeights(x - x0, wx);
+  CatmullRomWeights(y - y0, wy);
+  for (int j = 0; j < 4; ++j) {
+    const int row = Address(static_cast<int>(y0) - 1 + j, level.height, mode);
+    for (int i = 0; i < 4; ++i) {
+      const int column = Address(static_cast<int>(x0) - 1 + i, level.width, mode);
+      for (int c = 0; c < level.channels; ++c) {
+        out[c] += weight * wy[j] * wx[i] * static_cast<double>(level.At(column, row, c));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Result<SourceReference> BuildReference(const MapSet& set, const ReferenceOptions& options,
+                                       ThreadPool& pool, ProgressSink& progress) {
+  try {
+    PATINA_ASSIGN(SourceMaps maps, LoadSourceMaps(set, options, pool, progress));
+    return Builder(std::move(maps), options, pool, progress).Run();
+  } catch (const std::bad_alloc&) {
+    return Fail(
+        ErrorCode::kResourceExhausted,
+        set.name + ": not enough memory for the reference; use smaller maps or a larger machine");
+  }
+}
+
+void SampleReference(const TargetPyramid& pyramid, double u, double v, double s, double* out) {
+  std::fill(out, out + pyramid.channels, 0.0);
+  const double last = static_cast<double>(pyramid.levels.size()) - 1;
+  const double clamped = std::clamp(s, 0.0, last);
+  const auto fine = static_cast<size_t>(clamped);
+  const double share = clamped - static_cast<double>(fine);
+  AddLevel(pyramid.levels[fine], pyramid.address, u, v, 1 - share, out);
+  if (share > 0) AddLevel(pyramid.levels[fine + 1], pyramid.address, u, v, share, out);
+}
+
+}  // namespace patina

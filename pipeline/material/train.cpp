@@ -1,0 +1,324 @@
+#include "pipeline/material/train.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "pipeline/material/channel_stats.h"
+#include "pipeline/material/exporter.h"
+#include "pipeline/material/feature_init.h"
+#include "pipeline/material/trainer.h"
+
+namespace patina {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+double CpuSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// Training effort in samples a texel of the whole pyramid. Quality still grows with the logarithm beyond: see the README.
+double SamplesPerTexel(Quality quality) {
+  switch (quality) {
+    case Quality::kPreview: return 20;
+    case Quality::kStandard: return 150;
+    case Quality::kReference: return 1500;
+  }
+  return 150;
+}
+
+// Small sources train fast anyway, and their network needs steps to settle.
+constexpr double kMinSamples = 4e6;
+
+constexpr float kEndpointRate = 0.08f;  // binades
+constexpr float kIndexRate = 0.08f;
+constexpr float kNetworkRate = 3e-3f;
+constexpr double kWarmUp = 0.02;
+constexpr int kCoarsePasses = 3;
+constexpr double kTuneRate = 3e-5;
+constexpr double kTuneShare = 0.02;     // of the samples, for the network after the features are frozen
+// Re-encodes during the training, as shares of it: later training then starts from legal blocks.
+constexpr double kReencodeAt[] = {0.5, 0.75, 0.9};
+
+double CosineRate(double progress) {
+  const double warm = std::min(1.0, progress / kWarmUp);
+  return warm * 0.5 * (1 + std::cos(std::numbers::pi * std::min(1.0, progress)));
+}
+
+AdamRates FeatureRates(double factor) {
+  AdamRates rates;
+  rates.endpoint = static_cast<float>(kEndpointRate * factor);
+  rates.index = static_cast<float>(kIndexRate * factor);
+  rates.beta1 = 0.8f;
+  rates.beta2 = 0.99f;
+  rates.epsilon = 1e-7f;
+  return rates;
+}
+
+AdamRates NetworkRates(double rate) {
+  AdamRates rates;
+  rates.endpoint = static_cast<float>(rate);
+  rates.beta1 = 0.9f;
+  rates.beta2 = 0.99f;
+  rates.epsilon = 1e-8f;
+  return rates;
+}
+
+// What both recipes share: the clock, the curve, progress, cancelling, rolling back.
+class Session {
+ public:
+  Session(const TrainOptions& options, double budget, ProgressSink& progress, TrainedMaterial* result)
+      : options_(options), budget_(budget), progress_(progress), result_(result), start_(Clock::now()), start_cpu_(CpuSeconds()) {}
+
+  bool cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
+  double seconds() const { return SecondsSince(start_); }
+
+  // Reports at most a few times a second.
+  void Report(Trainer* trainer) {
+    if (SecondsSince(last_report_) < 0.2) return;
+    last_report_ = Clock::now();
+    ProgressEvent event;
+    event.stage = "train";
+    event.samples = trainer->samples();
+    event.fraction = std::min(1.0, trainer->samples() / budget_);
+    event.elapsed_s = seconds();
+    event.samples_per_s = event.samples / std::max(1e-3, event.elapsed_s);
+    event.eta_s = (budget_ - event.samples) / std::max(1.0, event.samples_per_s);
+    event.psnr_db = PsnrOfMse(trainer->TakeRunningError());
+    progress_.OnProgress(event);
+  }
+
+  void Record(Trainer* trainer, FeatureStore* store, const float* network) {
+    const ModelError error = trainer->Evaluate(store, network, 0);
+    CurvePoint point;
+    point.samples = trainer->samples();
+    point.wall_s = seconds();
+    point.cpu_s = CpuSeconds() - start_cpu_;
+    point.psnr_mip0_db = error.MipPsnr(0);
+    point.psnr_mean_mips_db = error.MeanMipsPsnr();
+    result_->curve.push_back(point);
+  }
+
+ private:
+  const TrainOptions& options_;
+  double budget_;
+  ProgressSink& progress_;
+  TrainedMaterial* result_;
+  Clock::time_point start_;
+  Clock::time_point last_report_{};
+  double start_cpu_;
+};
+
+constexpr int kOffGridWindows = 64;
+
+void KeepFloatQuality(Trainer* trainer, FeatureStore* store, const float* network, TrainedMaterial* result) {
+  const ModelError error = trainer->Evaluate(store, network, kOffGridWindows);
+  for (size_t mip = 0; mip < error.mip_mse.size(); ++mip) result->float_psnr_mips_db.push_back(error.MipPsnr(static_cast<int>(mip)));
+  result->float_psnr_mip0_db = error.MipPsnr(0);
+  result->float_psnr_mean_mips_db = error.MeanMipsPsnr();
+  result->float_psnr_off_grid_db = PsnrOfMse(error.off_grid_mse);
+}
+
+// Freezes the exported features, tunes the network on exactly what a decoder sees, and rounds it to the halves that are
+// written; fills the result.
+void FinishNetwork(const MaterialReference& reference, const MaterialKernels& kernels, ThreadPool& pool,
+                   const TrainOptions& options, const WindowDraw& draw, int windows_per_step, double tune_samples,
+                   double rate, Exporter* exporter, Network* network, TrainedMaterial* result) {
+  FeatureStore decoded;
+  exporter->DecodeTo(&decoded);
+  Trainer tuner(reference, result->shape, &decoded, network, kernels, pool, options.seed + 1, draw, windows_per_step);
+  network->RoundRawToHalf();
+  ModelError error = tuner.Evaluate(&decoded, network->raw(), kOffGridWindows);
+  network->Unfold();
+  network->Save();
+  while (tuner.samples() < tune_samples && !(options.cancel && options.cancel->cancelled())) {
+    const double factor = 0.5 * (1 + std::cos(std::numbers::pi * tuner.samples() / tune_samples));
+    if (!tuner.Step(AdamRates{.endpoint = 0, .index = 0}, NetworkRates(rate * factor), false)) ++result->rollbacks;
+  }
+  result->samples += tuner.samples();
+  network->RoundRawToHalf();
+  const ModelError tuned = tuner.Evaluate(&decoded, network->raw(), kOffGridWindows);
+  // What the mips gain together decides; a tune may favour the fine ones, which have most of the samples.
+  const auto score = [](const ModelError& e) { return e.MipPsnr(0) + e.MeanMipsPsnr(); };
+  if (score(tuned) > score(error)) {
+    error = tuned;
+  } else {
+    network->Restore();
+    network->RoundRawToHalf();
+  }
+  for (size_t mip = 0; mip < error.mip_mse.size(); ++mip) result->exported_psnr_mips_db.push_back(error.MipPsnr(static_cast<int>(mip)));
+  result->exported_psnr_mip0_db = error.MipPsnr(0);
+  result->exported_psnr_mean_mips_db = error.MeanMipsPsnr();
+  result->exported_psnr_off_grid_db = PsnrOfMse(error.off_grid_mse);
+
+  const int outputs = network->outputs();
+  const float* raw = network->raw();
+  result->w1.assign(raw + mlp::kW1, raw + mlp::kB1);
+  result->b1.assign(raw + mlp::kB1, raw + mlp::kW2);
+  result->w2.assign(raw + mlp::kW2, raw + mlp::OffsetB2(outputs));
+  result->b2.assign(raw + mlp::OffsetB2(outputs), raw + mlp::ParameterCount(outputs));
+  result->blocks = exporter->TakeBlocks();
+}
+
+void TrainPatina(const MaterialReference& reference, const MaterialKernels& kernels, const TrainOptions& options,
+                 double budget, ThreadPool& pool, Session* session, TrainedMaterial* result) {
+  const int mips = static_cast<int>(reference.pyramid.levels.size());
+  const ChannelStats stats = MeasureChannels(reference, std::min(1, mips - 1), pool);
+  std::vector<float> scale(stats.deviation);
+  for (float& s : scale) s = std::max(s, 1e-3f);
+  Network network(stats.mean, scale);
+  Rng rng(options.seed);
+  InitNetworkFromComponents(stats, scale, &rng, &network);
+  FeatureStore store;
+  store.Allocate(result->shape, BlockForm::kSegments, StoreUse::kAdam);
+  InitFeaturesFromComponents(reference, result->shape, stats, pool, &store);
+
+  const WindowDraw draw;
+  Trainer trainer(reference, result->shape, &store, &network, kernels, pool, options.seed, draw, kDefaultWindowsPerStep);
+  Exporter exporter(&trainer, result->shape, &store, pool);
+  session->Record(&trainer, &store, network.raw());
+  network.Save();
+  size_t next_reencode = 0;
+  double next_record = 1.0 / 16;
+  double guard = 1;  // lowers all rates after a step that had to be undone
+  int steps = 0;
+  result->stopped_by = "budget";
+  while (trainer.samples() < budget && !session->cancelled()) {
+    const double progress = trainer.samples() / budget;
+    const double factor = guard * CosineRate(progress);
+    if (trainer.Step(FeatureRates(factor), NetworkRates(kNetworkRate * factor), false)) {
+      if (++steps % 64 == 0) network.Save();
+    } else {
+      ++result->rollbacks;
+      guard *= 0.5;
+    }
+    if (next_reencode < std::size(kReencodeAt) && progress >= kReencodeAt[next_reencode]) {
+      ++next_reencode;
+      exporter.Encode();
+    }
+    if (progress >= next_record) {
+      session->Record(&trainer, &store, network.raw());
+      next_record *= 2;
+    }
+    session->Report(&trainer);
+  }
+  if (session->cancelled()) return;
+  session->Record(&trainer, &store, network.raw());
+  result->samples = trainer.samples();
+  KeepFloatQuality(&trainer, &store, network.raw(), result);
+  exporter.Encode();
+  exporter.Refine(0);
+  // Coarse levels are few and their mips exact enough to feel every code: once more costs little.
+  for (int pass = 0; pass < kCoarsePasses; ++pass) exporter.Refine(1);
+  FinishNetwork(reference, kernels, pool, options, draw, kDefaultWindowsPerStep, kTuneShare * budget, kTuneRate, &exporter, &network, result);
+}
+
+// The recipe of Weinreich 2024, sections 5.1, 6.1: random start, free texels, then blocks; uniform s, batches of 512 x 512,
+// Adam with exponentially falling rates; one 6-bit mode; at last the network alone. Iterations are those that the samples
+// allow, and the rates fall by the same total factor as in the paper's 205,000.
+// Differs from the paper: a batch is 64 windows of 64 x 64 samples at random places, each with its own s, in place of one
+// jittered grid over the whole texture; blocks that a batch does not touch are not updated; and sources below 2048 x 2048 get
+// smaller batches in proportion, as they would else get too few iterations from the same samples a texel.
+void TrainPaper(const MaterialReference& reference, const MaterialKernels& kernels, const TrainOptions& options, double budget,
+                ThreadPool& pool, Session* session, TrainedMaterial* result) {
+  const TargetLevel& base = reference.pyramid.levels[0];
+  const int windows_per_batch = static_cast<int>(std::clamp(static_cast<double>(base.width) * base.height / 65536, 4.0, 64.0));
+  constexpr double kFreeShare = 5.0 / 205, kTune = 1.0 / 205;
+  constexpr double kFreeFall = 5000 * 5e-4, kBlockFall = 200000 * 1e-4;  // -ln of the total decay
+  const std::vector<float> mean(reference.pyramid.channels, 0.0f), scale(reference.pyramid.channels, 1.0f);
+  Network network(mean, scale);
+  Rng rng(options.seed);
+  InitNetworkAtRandom(&rng, &network);
+  const WindowDraw draw{.uniform_scale = true, .off_grid_share = 1.0f};
+  const auto rates = [](double rate) {
+    AdamRates r;
+    r.endpoint = r.index = static_cast<float>(rate);
+    return r;
+  };
+  const auto run = [&](Trainer* trainer, double samples, double feature_rate, double network_rate, double fall) {
+    network.Save();
+    while (trainer->samples() < samples && !session->cancelled()) {
+      const double factor = std::exp(-fall * trainer->samples() / samples);
+      if (!trainer->Step(rates(feature_rate * factor), rates(network_rate * factor), true)) ++result->rollbacks;
+      session->Report(trainer);
+    }
+  };
+
+  // At least 300 iterations of the free phase: fewer leave the partitions to chance.
+  const double batch = windows_per_batch * kWindowSide * kWindowSide;
+  const double free_samples = std::max(budget * kFreeShare, std::min(300 * batch, 0.1 * budget));
+  FeatureStore store;
+  {
+    FeatureStore free_store;
+    free_store.Allocate(result->shape, BlockForm::kFree, StoreUse::kAccumulate);
+    InitFeaturesAtRandom(&rng, &free_store);
+    Trainer trainer(reference, result->shape, &free_store, &network, kernels, pool, options.seed, draw, windows_per_batch);
+    run(&trainer, free_samples, 5e-2, 1e-3, kFreeFall);
+    if (session->cancelled()) return;
+    session->Record(&trainer, &free_store, network.raw());
+    store.Allocate(result->shape, BlockForm::kSegments, StoreUse::kAccumulate);
+    InitBlocksFromFreeTexels(free_store, pool, &store);
+    result->samples = trainer.samples();
+  }
+  Trainer trainer(reference, result->shape, &store, &network, kernels, pool, options.seed + 7, draw, windows_per_batch);
+  Exporter exporter(&trainer, result->shape, &store, pool);
+  const double block_samples = budget * (1 - kTune) - free_samples;
+  run(&trainer, block_samples, 1e-2, 1e-3, kBlockFall);
+  if (session->cancelled()) return;
+  session->Record(&trainer, &store, network.raw());
+  result->samples += trainer.samples();
+  result->stopped_by = "budget";
+  KeepFloatQuality(&trainer, &store, network.raw(), result);
+  exporter.EncodeSixBit();
+  FinishNetwork(reference, kernels, pool, options, draw, windows_per_batch, kTune * budget, 1e-3, &exporter, &network, result);
+}
+
+}  // namespace
+
+double SampleBudget(const MaterialReference& reference, const TrainOptions& options) {
+  if (options.samples > 0) return options.samples;
+  double texels = 0;
+  for (const TargetLevel& level : reference.pyramid.levels) texels += static_cast<double>(level.width) * level.height;
+  return std::max(kMinSamples, texels * SamplesPerTexel(options.quality));
+}
+
+Result<TrainedMaterial> TrainMaterial(const MaterialReference& reference, const ModelShape& shape,
+                                      const TrainOptions& options, ThreadPool& pool, ProgressSink& progress) {
+  PATINA_ASSIGN(const SimdTarget target, ActiveSimdTarget());
+  const int outputs = reference.pyramid.channels;
+  if (outputs < 1 || outputs > kMaxOutputs) {
+    return Fail(ErrorCode::kInvalidArgument, "a material needs 1 to " + std::to_string(kMaxOutputs) +
+                                                 " channels that vary to be trained, this one has " + std::to_string(outputs));
+  }
+  TrainedMaterial result;
+  result.shape = shape;
+  result.outputs = outputs;
+  const double budget = SampleBudget(reference, options);
+  Session session(options, budget, progress, &result);
+  if (options.recipe == Recipe::kPaper) {
+    TrainPaper(reference, KernelsFor(target), options, budget, pool, &session, &result);
+  } else {
+    TrainPatina(reference, KernelsFor(target), options, budget, pool, &session, &result);
+  }
+  if (session.cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
+  for (const auto* weights : {&result.w1, &result.b1, &result.w2, &result.b2}) {
+    for (const float w : *weights) {
+      if (std::isfinite(w)) continue;
+      return Fail(ErrorCode::kOutOfRange, "a weight of the decoder network does not fit half precision: bring the coded values of "
+                                          "the channels near [-1, 1] by their scale");
+    }
+  }
+  return result;
+}
+
+}  // namespace patina

@@ -1,0 +1,17 @@
+// Window kernels for avx512; see pipeline/kernels/simd16.h for the scheme.
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "pipeline/material/partition_masks.h"
+#include "pipeline/material/window_kernels.h"
+#include "pipeline/nn/mlp.h"
+
+// clang-format off: the order is the scheme
+#include "pipeline/kernels/begin_avx512.h"
+#include "pipeline/kernels/simd16.h"
+#include "pipeline/kernels/unroll.h"
+#include "pipeline/nn/mlp.inl"
+#include "pipeline/material/block_kernels.inl"
+#include "pipeline/material/window_kernels.inl"
+#include "pipeline/kernels/end_target.h"

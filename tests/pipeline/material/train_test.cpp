@@ -1,0 +1,240 @@
+// The whole trainer on small materials: it learns, it is reproducible, its export is legal and close, hard input stays finite.
+#include "pipeline/material/train.h"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "formats/half.h"
+#include "pipeline/base/rng.h"
+#include "pipeline/kernels/dispatch.h"
+
+namespace patina {
+namespace {
+
+// value(u, v, channel) sampled at texel centres; coarser mips by averaging.
+MaterialReference MakeReference(int width, int height, int channels, AddressMode address,
+                                const std::function<float(double, double, int)>& value) {
+  MaterialReference reference;
+  reference.pyramid.channels = channels;
+  reference.pyramid.address = address;
+  std::vector<float> texels(static_cast<size_t>(width) * height * channels);
+  for (int c = 0; c < channels; ++c) {
+    TargetChannel channel;
+    channel.map = "map" + std::to_string(c);
+    channel.learned_index = c;
+    channel.min_value = std::numeric_limits<float>::max();
+    channel.max_value = -channel.min_value;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const float v = value((x + 0.5) / width, (y + 0.5) / height, c);
+        texels[(static_cast<size_t>(y) * width + x) * channels + c] = v;
+        channel.min_value = std::min(channel.min_value, v);
+        channel.max_value = std::max(channel.max_value, v);
+      }
+    }
+    reference.channels.push_back(channel);
+  }
+  for (int w = width, h = height;;) {
+    TargetLevel level;
+    level.Allocate(w, h, channels);
+    for (int y = 0; y < h; ++y) {
+      for (int x = 0; x < w; ++x) {
+        for (int c = 0; c < channels; ++c) level.Set(x, y, c, texels[(static_cast<size_t>(y) * w + x) * channels + c]);
+      }
+    }
+    level.FillPadding(address);
+    reference.pyramid.levels.push_back(std::move(level));
+    if (w == 1 && h == 1) break;
+    const int nw = std::max(1, w / 2), nh = std::max(1, h / 2);
+    std::vector<float> next(static_cast<size_t>(nw) * nh * channels);
+    for (int y = 0; y < nh; ++y) {
+      for (int x = 0; x < nw; ++x) {
+        for (int c = 0; c < channels; ++c) {
+          float sum = 0;
+          for (int k = 0; k < 4; ++k) {
+            const int sx = std::min(2 * x + (k & 1), w - 1), sy = std::min(2 * y + (k >> 1), h - 1);
+            sum += texels[(static_cast<size_t>(sy) * w + sx) * channels + c];
+          }
+          next[(static_cast<size_t>(y) * nw + x) * channels + c] = 0.25f * sum;
+        }
+      }
+    }
+    texels.swap(next);
+    w = nw;
+    h = nh;
+  }
+  return reference;
+}
+
+float Waves(double u, double v, int c) {
+  return static_cast<float>(0.5 + 0.3 * std::sin(12.566 * u + c) * std::cos(18.85 * v - 2 * c) + 0.1 * std::sin(62.83 * (u + v) + c));
+}
+
+TrainedMaterial MustTrain(const MaterialReference& reference, TrainOptions options, int threads, Profile profile = Profile::kBcf1k) {
+  ThreadPool pool(threads);
+  const TargetLevel& base = reference.pyramid.levels[0];
+  auto result = TrainMaterial(reference, ShapeForProfile(profile, base.width, base.height), options, pool, NoProgress());
+  EXPECT_TRUE(result) << (result ? "" : result.error().message);
+  return result ? std::move(*result) : TrainedMaterial{};
+}
+
+TrainOptions Samples(double samples) {
+  TrainOptions options;
+  options.samples = samples;
+  return options;
+}
+
+void ExpectLegalAndFinite(const TrainedMaterial& material) {
+  for (int t = 0; t < kFeatureTextures; ++t) {
+    ASSERT_EQ(static_cast<int>(material.blocks[t].size()), material.shape[t].levels);
+    for (const auto& level : material.blocks[t]) {
+      for (const bc6h::Block& block : level) {
+        ASSERT_TRUE(bc6h::Unpack(block.data(), bc6h::Format::kUf16));
+        uint16_t texels[16][3];
+        bc6h::Decode(block.data(), bc6h::Format::kUf16, texels);
+        for (const auto& texel : texels) {
+          for (const uint16_t half : texel) ASSERT_TRUE(HalfIsFinite(half));
+        }
+      }
+    }
+  }
+  for (const auto* weights : {&material.w1, &material.b1, &material.w2, &material.b2}) {
+    for (const float w : *weights) {
+      ASSERT_TRUE(std::isfinite(w));
+      ASSERT_EQ(w, HalfToFloat(FloatToHalf(w)));
+    }
+  }
+}
+
+bool SameBytes(const TrainedMaterial& a, const TrainedMaterial& b) {
+  return a.blocks == b.blocks && a.w1 == b.w1 && a.b1 == b.b1 && a.w2 == b.w2 && a.b2 == b.b2;
+}
+
+// The bound is looser than on real sets: what little noise a smooth material has is all that the export can lose.
+TEST(Train, LearnsASmoothMaterialAndExportsItWithinHalfADecibel) {
+  const auto reference = MakeReference(128, 128, 6, AddressMode::kWrap, Waves);
+  const TrainedMaterial material = MustTrain(reference, Samples(4e6), 2);
+  ExpectLegalAndFinite(material);
+  EXPECT_GT(material.exported_psnr_mip0_db, 36);
+  EXPECT_GT(material.exported_psnr_mip0_db, material.float_psnr_mip0_db - 0.5);
+  EXPECT_GT(material.exported_psnr_off_grid_db, 34);
+}
+
+TEST(Train, BeatsThePapersRecipeAtEqualSamples) {
+  const auto reference = MakeReference(128, 128, 6, AddressMode::kWrap, Waves);
+  TrainOptions paper = Samples(1e7);
+  paper.recipe = Recipe::kPaper;
+  const TrainedMaterial theirs = MustTrain(reference, paper, 2);
+  ExpectLegalAndFinite(theirs);
+  const TrainedMaterial ours = MustTrain(reference, Samples(1e7), 2);
+  EXPECT_GT(ours.exported_psnr_mip0_db, theirs.exported_psnr_mip0_db + 2);
+  EXPECT_GT(theirs.exported_psnr_mip0_db, 12) << "the paper's recipe must learn too";
+}
+
+TEST(Train, PaperExportUsesTheSixBitModeOnly) {
+  const auto reference = MakeReference(64, 64, 4, AddressMode::kWrap, Waves);
+  TrainOptions options = Samples(1.5e6);
+  options.recipe = Recipe::kPaper;
+  const TrainedMaterial material = MustTrain(reference, options, 2);
+  for (const auto& texture : material.blocks) {
+    for (const auto& level : texture) {
+      for (const bc6h::Block& block : level) {
+        EXPECT_EQ(bc6h::Unpack(block.data(), bc6h::Format::kUf16)->mode, bc6h::kModeSixBit);
+      }
+    }
+  }
+}
+
+TEST(Train, GivesTheSameBytesForAnyThreadCountAndTarget) {
+  const auto reference = MakeReference(160, 96, 5, AddressMode::kWrap, Waves);
+  for (const Recipe recipe : {Recipe::kPatina, Recipe::kPaper}) {
+    TrainOptions options = Samples(1.2e6);
+    options.recipe = recipe;
+    const TrainedMaterial one = MustTrain(reference, options, 1);
+    EXPECT_TRUE(SameBytes(one, MustTrain(reference, options, 2)));
+    EXPECT_TRUE(SameBytes(one, MustTrain(reference, options, 3)));
+    for (const SimdTarget target : {SimdTarget::kAvx2, SimdTarget::kAvx512}) {
+      if (!SimdTargetSupported(target)) continue;
+      ASSERT_TRUE(ForceSimdTarget(SimdTargetName(target)));
+      EXPECT_EQ(*ActiveSimdTarget(), target);
+      EXPECT_TRUE(SameBytes(one, MustTrain(reference, options, 2))) << SimdTargetName(target);
+      ASSERT_TRUE(ForceSimdTarget("auto"));
+    }
+    options.seed = 2;
+    EXPECT_FALSE(SameBytes(one, MustTrain(reference, options, 1))) << "the seed must matter";
+  }
+}
+
+TEST(Train, TakesEveryProfileAndOddShapesWrappedAndClamped) {
+  struct Shape { int width, height; };
+  for (const Shape shape : {Shape{1, 1}, Shape{2, 3}, Shape{1, 37}, Shape{67, 41}, Shape{130, 1}, Shape{16, 128}}) {
+    for (const Profile profile : {Profile::kBcf05k, Profile::kBcf1k, Profile::kBcf2k, Profile::kBcf2kPlus}) {
+      for (const AddressMode address : {AddressMode::kWrap, AddressMode::kClamp}) {
+        SCOPED_TRACE(std::to_string(shape.width) + "x" + std::to_string(shape.height) + " " + ProfileName(profile));
+        const auto reference = MakeReference(shape.width, shape.height, 3, address, Waves);
+        const TrainedMaterial material = MustTrain(reference, Samples(2e5), 2, profile);
+        ExpectLegalAndFinite(material);
+        EXPECT_GT(material.exported_psnr_mip0_db, 13);
+      }
+    }
+  }
+}
+
+TEST(Train, StaysFiniteOnHardInput) {
+  Rng rng(77);
+  const std::vector<std::pair<const char*, std::function<float(double, double, int)>>> cases = {
+      {"pure noise", [&](double, double, int) { return rng.Uniform(); }},
+      {"checkerboard at Nyquist", [](double u, double v, int) { return static_cast<float>((static_cast<int>(u * 64) + static_cast<int>(v * 64)) % 2); }},
+      {"one different texel", [](double u, double v, int) { return u < 1.0 / 64 && v < 1.0 / 64 ? 1.0f : 0.25f; }},
+      {"a spike of 1 in the dark", [](double u, double v, int c) { return u > 0.5 && u < 0.52 && v > 0.5 && v < 0.52 ? 1.0f : Waves(u, v, c) * 1e-5f; }},
+      {"tiny values", [](double u, double v, int c) { return 1e-7f * Waves(u, v, c); }},
+      {"a range of 100", [](double u, double v, int c) { return 100.0f * Waves(u, v, c); }},
+      {"negative", [](double u, double v, int c) { return -Waves(u, v, c); }},
+      {"channels of wildly different scale", [](double u, double v, int c) { return std::pow(10.0f, static_cast<float>(2 * c - 6)) * Waves(u, v, c); }},
+      {"equal channels", [](double u, double v, int) { return Waves(u, v, 0); }},
+  };
+  for (const auto& [name, value] : cases) {
+    SCOPED_TRACE(name);
+    const auto reference = MakeReference(64, 64, 5, AddressMode::kWrap, value);
+    const TrainedMaterial material = MustTrain(reference, Samples(5e5), 2);
+    ExpectLegalAndFinite(material);
+    EXPECT_TRUE(std::isfinite(material.exported_psnr_mip0_db));
+  }
+}
+
+TEST(Train, RefusesNoChannelsAndTooMany) {
+  ThreadPool pool(1);
+  MaterialReference reference = MakeReference(4, 4, 1, AddressMode::kWrap, Waves);
+  reference.pyramid.channels = 0;
+  auto none = TrainMaterial(reference, ShapeForProfile(Profile::kBcf1k, 4, 4), {}, pool, NoProgress());
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::kInvalidArgument);
+  reference.pyramid.channels = kMaxOutputs + 1;
+  EXPECT_FALSE(TrainMaterial(reference, ShapeForProfile(Profile::kBcf1k, 4, 4), {}, pool, NoProgress()));
+}
+
+TEST(Train, RefusesWhatHalfWeightsCannotHold) {
+  const auto reference = MakeReference(16, 16, 2, AddressMode::kWrap, [](double u, double v, int c) { return 1e6f * Waves(u, v, c); });
+  ThreadPool pool(1);
+  const auto result = TrainMaterial(reference, ShapeForProfile(Profile::kBcf1k, 16, 16), Samples(1e5), pool, NoProgress());
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::kOutOfRange);
+}
+
+TEST(Train, StopsWhenCancelled) {
+  const auto reference = MakeReference(64, 64, 3, AddressMode::kWrap, Waves);
+  ThreadPool pool(2);
+  CancelToken cancel;
+  cancel.Cancel();
+  TrainOptions options = Samples(1e12);
+  options.cancel = &cancel;
+  const auto result = TrainMaterial(reference, ShapeForProfile(Profile::kBcf1k, 64, 64), options, pool, NoProgress());
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace patina
