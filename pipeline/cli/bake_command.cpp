@@ -1,0 +1,209 @@
+#include <cstdio>
+#include <filesystem>
+#include <set>
+
+#include "formats/base/file_io.h"
+#include "pipeline/cli/commands.h"
+#include "pipeline/cli/result_text.h"
+#include "pipeline/jobs/event_log.h"
+#include "pipeline/jobs/job_runner.h"
+#include "pipeline/jobs/job_sets.h"
+
+namespace patina {
+namespace {
+
+// A job, or why there is none.
+struct Planned {
+  std::string asset;
+  Result<Job> job;
+};
+
+template <class Enum, class Parse>
+void Override(const std::optional<std::string>& name, Parse parse, Enum* value) {
+  if (!name) return;
+  // The command line has let no other names through.
+  if (auto parsed = parse(*name)) *value = *parsed;
+}
+
+template <class T>
+void Override(const std::optional<T>& given, T* value) {
+  if (given) *value = *given;
+}
+
+void Apply(const JobOverrides& overrides, Job* job) {
+  Override(overrides.out, &job->out);
+  Override(overrides.profile, ParseProfile, &job->profile);
+  Override(overrides.quality, ParseQuality, &job->quality);
+  Override(overrides.recipe, ParseRecipe, &job->recipe);
+  if (overrides.address) job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
+  Override(overrides.normal_convention, &job->normal_convention);
+  Override(overrides.seed, &job->seed);
+  Override(overrides.threads, &job->threads);
+  Override(overrides.target_psnr_db, &job->target_psnr_db);
+  Override(overrides.time_budget_s, &job->time_budget_s);
+  Override(overrides.samples, &job->samples);
+  Override(overrides.min_psnr_db, &job->min_psnr_db);
+  if (overrides.repair_nonfinite) job->repair_nonfinite = true;
+  if (overrides.no_toksvig) job->toksvig = false;
+}
+
+void PlanFolder(const std::string& folder, const BakeOptions& options, Verbosity verbosity, std::vector<Planned>* plan) {
+  auto found = FindAssets(folder, options.job.out.value_or(""));
+  if (!found) {
+    plan->push_back({AssetNameFromPath(folder), Fail(found.error())});
+    return;
+  }
+  if (verbosity == Verbosity::kVerbose) {
+    for (const std::string& skipped : found->skipped) {
+      std::fprintf(stderr, "patina: %s holds no images and is passed over\n", skipped.c_str());
+    }
+  }
+  for (const FoundAsset& asset : found->assets) {
+    if (!asset.problem.empty()) {
+      plan->push_back({asset.asset, Fail(asset.problem_code, asset.problem)});
+      continue;
+    }
+    Job job;
+    job.asset = asset.asset;
+    job.folder = asset.folder;
+    job.set = asset.set;
+    plan->push_back({asset.asset, std::move(job)});
+  }
+}
+
+std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
+  std::vector<Planned> plan;
+  for (const std::string& input : options.inputs) {
+    std::error_code ignored;
+    if (!options.map_list.empty()) {
+      auto maps = ReadMapListFile(options.map_list);
+      Job job;
+      job.asset = AssetNameFromPath(input);
+      job.folder = input;
+      job.maps_folder = FolderOfFile(options.map_list);
+      if (!maps) {
+        plan.push_back({job.asset, Fail(maps.error())});
+        continue;
+      }
+      job.maps = std::move(*maps);
+      plan.push_back({job.asset, std::move(job)});
+    } else if (std::filesystem::is_regular_file(input, ignored)) {
+      auto job = ReadJobFile(input);
+      const std::string asset = job ? job->asset : AssetNameFromPath(input);
+      plan.push_back({asset, std::move(job)});
+    } else {
+      PlanFolder(input, options, verbosity, &plan);
+    }
+  }
+  std::set<std::string> taken;
+  for (Planned& planned : plan) {
+    if (!planned.job) continue;
+    Apply(options.job, &*planned.job);
+    if (planned.job->out.empty()) {
+      planned.job = Fail(ErrorCode::kInvalidArgument, "no folder for the container; give --out DIR");
+    } else if (!taken.insert(planned.job->out + "\n" + planned.asset).second) {
+      planned.job = Fail(ErrorCode::kConflict, "another input of this run is also named " + planned.asset +
+                                                   "; rename its folder, or bake it into another --out");
+    }
+  }
+  return plan;
+}
+
+JobResult Unplanned(const std::string& asset, const Error& error) {
+  JobResult result;
+  result.asset = asset;
+  result.error = error;
+  result.error_stage = "ingest";
+  result.exit_code = ExitCodeFor(error, true);
+  return result;
+}
+
+// Later in the list is worse.
+int Severity(int exit_code) {
+  constexpr int kOrder[] = {kExitDone, kExitQualityGate, kExitBadInput, kExitUsage, kExitFailed, kExitInterrupted};
+  for (int i = 0; i < 6; ++i) {
+    if (kOrder[i] == exit_code) return i;
+  }
+  return 4;
+}
+
+void Print(const JobResult& result, const CommandLine& line) {
+  if (result.error) return PrintError(result.asset + ": " + result.error->message);
+  if (line.verbosity == Verbosity::kQuiet) return;
+  std::fputs(ResultText(result).c_str(), line.json ? stderr : stdout);
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int BakeCommand(const CommandLine& line, const CancelToken& cancel) {
+  const BakeOptions& options = line.bake;
+  if (!options.map_list.empty() && options.inputs.size() != 1) {
+    PrintError("--maps describes one material; give one INPUT folder with it");
+    return kExitUsage;
+  }
+  const std::vector<Planned> plan = Plan(options, line.verbosity);
+  std::vector<JobResult> results;
+  int worst = kExitDone;
+  for (const Planned& planned : plan) {
+    if (cancel.cancelled() && !results.empty()) break;
+    if (planned.job) {
+      TerminalProgress progress(stderr, line.verbosity, planned.asset);
+      results.push_back(RunJob(*planned.job, progress, cancel));
+    } else {
+      results.push_back(Unplanned(planned.asset, planned.job.error()));
+    }
+    Print(results.back(), line);
+    if (Severity(results.back().exit_code) > Severity(worst)) worst = results.back().exit_code;
+  }
+  if (plan.size() > 1 && line.verbosity != Verbosity::kQuiet) {
+    std::fputs(SummaryText(results, plan.size()).c_str(), line.json ? stderr : stdout);
+  }
+  if (line.json) {
+    std::printf("%s\n", (plan.size() == 1 ? JobResultToJson(results[0], -1) : ResultsToJson(results, worst)).c_str());
+  }
+  return worst;
+}
+
+int RunCommand(const CommandLine& line, const CancelToken& cancel) {
+  const RunOptions& options = line.run;
+  const std::string& neighbour = options.events.empty() ? options.job_file : options.events;
+  const std::string folder = FolderOfFile(neighbour);
+  const std::string result_path =
+      !options.result.empty() ? options.result : folder.empty() ? "result.json" : folder + "/result.json";
+
+  ObserverList observers;
+  std::optional<EventLog> events;
+  if (!options.events.empty()) {
+    auto opened = EventLog::Open(options.events);
+    if (!opened) return FailCommand(opened.error());
+    events.emplace(std::move(*opened));
+    observers.Add(&*events);
+  }
+  auto job = ReadJobFile(options.job_file);
+  TerminalProgress terminal(stderr, line.verbosity, job ? job->asset : AssetNameFromPath(options.job_file));
+  observers.Add(&terminal);
+  JobResult result;
+  if (job) {
+    result = RunJob(*job, observers, cancel);
+  } else {
+    result = Unplanned("", job.error());
+    observers.OnResult(result);
+  }
+  if (result.asset.empty() && result.error) {
+    PrintError(result.error->message);
+  } else {
+    Print(result, line);
+  }
+  if (events && events->failed()) PrintError("some events could not be written to " + options.events);
+  const Status written = WriteFileDurably(result_path, std::string_view(JobResultToJson(result, 2) + "\n"));
+  if (line.json) std::printf("%s\n", JobResultToJson(result, -1).c_str());
+  if (!written) {
+    PrintError(written.error().message);
+    // The container, if any, is published; but who relies on the result file must not take it for done.
+    return result.exit_code == kExitDone ? static_cast<int>(kExitFailed) : result.exit_code;
+  }
+  return result.exit_code;
+}
+
+}  // namespace patina

@@ -1,0 +1,25 @@
+// What each command of `patina` does. Each returns the exit code; errors are printed.
+#pragma once
+
+#include <string>
+
+#include "formats/base/result.h"
+#include "pipeline/base/progress.h"
+#include "pipeline/cli/options.h"
+
+namespace patina {
+
+int BakeCommand(const CommandLine& line, const CancelToken& cancel);
+int RunCommand(const CommandLine& line, const CancelToken& cancel);
+int UnpackCommand(const CommandLine& line, const CancelToken& cancel);
+int InfoCommand(const CommandLine& line);
+int CompareCommand(const CommandLine& line, const CancelToken& cancel);
+int SampleCommand(const CommandLine& line);
+
+// "patina: error: <message>" on standard error.
+void PrintError(const std::string& message);
+
+// Prints the error; returns its exit code, that of bad input for what the user can correct.
+int FailCommand(const Error& error);
+
+}  // namespace patina

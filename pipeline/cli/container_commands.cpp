@@ -1,0 +1,94 @@
+#include <cstdio>
+#include <filesystem>
+
+#include "pipeline/cli/commands.h"
+#include "formats/container.h"
+#include "pipeline/image/image_io.h"
+#include "pipeline/jobs/compare.h"
+#include "pipeline/jobs/describe.h"
+#include "pipeline/jobs/job.h"
+#include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/sample_set.h"
+#include "pipeline/jobs/unpack.h"
+
+namespace patina {
+
+void PrintError(const std::string& message) { std::fprintf(stderr, "patina: error: %s\n", message.c_str()); }
+
+int FailCommand(const Error& error) {
+  PrintError(error.message);
+  return ExitCodeFor(error, true);
+}
+
+int UnpackCommand(const CommandLine& line, const CancelToken& cancel) {
+  const UnpackOptions& options = line.unpack;
+  ThreadPool pool(line.threads);
+  SetImageIoThreads(pool.threads());
+  auto unpacked = UnpackContainer(options.container, options.out, options.mip,
+                                  options.format == "exr" ? UnpackFormat::kExr : UnpackFormat::kPng, pool, cancel);
+  if (!unpacked) return FailCommand(unpacked.error());
+  for (const std::string& warning : unpacked->warnings) std::fprintf(stderr, "patina: warning: %s\n", warning.c_str());
+  if (line.verbosity != Verbosity::kQuiet) {
+    for (const std::string& path : unpacked->paths) std::printf("%s\n", path.c_str());
+  }
+  return kExitDone;
+}
+
+int InfoCommand(const CommandLine& line) {
+  auto container = OpenContainer(line.info.container);
+  if (!container) return FailCommand(container.error());
+  if (!line.json) {
+    std::fputs(ContainerText(*container).c_str(), stdout);
+    return kExitDone;
+  }
+  auto json = ContainerJson(*container);
+  if (!json) return FailCommand(json.error());
+  std::printf("%s\n", json->c_str());
+  return kExitDone;
+}
+
+int CompareCommand(const CommandLine& line, const CancelToken& cancel) {
+  const CompareOptions& options = line.compare;
+  Job source;
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(options.source, ignored)) {
+    auto job = ReadJobFile(options.source);
+    if (!job) return FailCommand(job.error());
+    source = std::move(*job);
+  } else {
+    source.folder = options.source;
+    source.asset = AssetNameFromPath(options.source);
+  }
+  if (!options.map_list.empty()) {
+    auto maps = ReadMapListFile(options.map_list);
+    if (!maps) return FailCommand(maps.error());
+    source.maps = std::move(*maps);
+    source.maps_folder = FolderOfFile(options.map_list);
+  }
+  source.repair_nonfinite = source.repair_nonfinite || options.repair_nonfinite;
+  ThreadPool pool(line.threads);
+  TerminalProgress progress(stderr, line.verbosity, source.asset);
+  auto comparison = CompareContainer(options.container, source, pool, cancel, progress);
+  progress.OnResult({});
+  if (!comparison) return FailCommand(comparison.error());
+  if (line.json) {
+    std::printf("%s\n", ComparisonToJson(*comparison).c_str());
+  } else {
+    std::fputs(ComparisonText(*comparison).c_str(), stdout);
+  }
+  return kExitDone;
+}
+
+int SampleCommand(const CommandLine& line) {
+  const SampleOptions& options = line.sample;
+  ThreadPool pool(line.threads);
+  SetImageIoThreads(pool.threads());
+  auto paths = WriteSampleSet(options.out, options.size, options.seed, pool);
+  if (!paths) return FailCommand(paths.error());
+  if (line.verbosity != Verbosity::kQuiet) {
+    for (const std::string& path : *paths) std::printf("%s\n", path.c_str());
+  }
+  return kExitDone;
+}
+
+}  // namespace patina

@@ -1,0 +1,93 @@
+// The command line of `patina` as plain values.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/cli/terminal_progress.h"
+
+namespace patina {
+
+// Every option of `bake` that can replace what a job file says. Absent: the job file's value, or the default.
+struct JobOverrides {
+  std::optional<std::string> out;
+  std::optional<std::string> profile;
+  std::optional<std::string> quality;
+  std::optional<std::string> recipe;
+  std::optional<std::string> address;
+  std::optional<std::string> normal_convention;
+  std::optional<uint64_t> seed;
+  std::optional<int> threads;
+  std::optional<double> target_psnr_db;
+  std::optional<double> time_budget_s;
+  std::optional<double> samples;
+  std::optional<double> min_psnr_db;
+  bool repair_nonfinite = false;
+  bool no_toksvig = false;
+};
+
+struct BakeOptions {
+  std::vector<std::string> inputs;  // folders of maps, folders of such folders, job files
+  std::string map_list;             // --maps FILE.json, or empty
+  JobOverrides job;
+};
+
+struct RunOptions {
+  std::string job_file;
+  std::string events;  // empty: none
+  std::string result;  // empty: result.json beside the events, or beside the job
+};
+
+struct UnpackOptions {
+  std::string container;
+  std::string out;
+  int mip = 0;
+  std::string format = "png";  // "png" or "exr"
+};
+
+struct InfoOptions {
+  std::string container;
+};
+
+struct CompareOptions {
+  std::string container;
+  std::string source;    // a folder of maps, or a job file
+  std::string map_list;  // --maps FILE.json, or empty
+  bool repair_nonfinite = false;
+};
+
+struct SampleOptions {
+  std::string out;
+  int size = 1024;
+  uint64_t seed = 1;
+};
+
+enum class Command { kBake, kRun, kUnpack, kInfo, kCompare, kSample };
+
+struct CommandLine {
+  Command command = Command::kBake;
+  BakeOptions bake;
+  RunOptions run;
+  UnpackOptions unpack;
+  InfoOptions info;
+  CompareOptions compare;
+  SampleOptions sample;
+  bool json = false;
+  Verbosity verbosity = Verbosity::kNormal;
+  std::string simd;  // empty: what the environment says, or the best
+  int threads = 0;  // of commands other than bake and run
+};
+
+// What came of parsing: a command to run, or text to print and a code to exit with.
+struct ParsedCommandLine {
+  std::optional<CommandLine> command;
+  int exit_code = 0;
+  std::string text;  // help or version if exit_code is 0, else the error
+};
+
+// Parses the arguments. No arguments, `help` and --help give the help text; --version the version.
+ParsedCommandLine ParseCommandLine(int argc, const char* const* argv);
+
+}  // namespace patina

@@ -1,0 +1,589 @@
+#include "pipeline/image/map_finder.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include "pipeline/image/image_io.h"
+#include "pipeline/image/map_name.h"
+
+namespace patina {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A file whose name was understood.
+struct Candidate {
+  std::string file;
+  std::string path;
+  MapName name;
+  bool guessed = false;  // reported as a guess
+  std::string because;   // why it is a guess
+};
+
+// One claim of a file on a role.
+struct Claim {
+  const Candidate* candidate = nullptr;
+  TokenPart part;
+  int rank = 0;
+  bool borrowed = false;  // from a group of another stem
+};
+
+std::string LowerExtension(const std::string& file) {
+  std::string extension = fs::path(file).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
+
+// Lossless and deep formats first: of two files with the same size and depth the first is used.
+int FormatOrder(const std::string& file) {
+  static const std::vector<std::string> order = {".exr", ".tif", ".tiff", ".png", ".tga",
+                                                 ".hdr", ".dds", ".jpg",  ".jpeg"};
+  return static_cast<int>(std::find(order.begin(), order.end(), LowerExtension(file)) -
+                          order.begin());
+}
+
+bool StartsWith(const std::vector<std::string>& words, const std::vector<std::string>& prefix) {
+  return words.size() >= prefix.size() && std::equal(prefix.begin(), prefix.end(), words.begin());
+}
+
+// "shared", "common": words that mark a map as belonging to several materials.
+std::vector<std::string> WithoutSharedWords(std::vector<std::string> words) {
+  std::erase_if(words, [](const std::string& word) {
+    return word == "shared" || word == "common" || word == "all";
+  });
+  return words;
+}
+
+int DepthOf(const ImageInfo& info) {
+  switch (info.type) {
+    case SampleType::kUint8:
+      return 1;
+    case SampleType::kUint16:
+      return 2;
+    case SampleType::kHalf:
+      return 3;
+    case SampleType::kFloat:
+      return 4;
+  }
+  return 0;
+}
+
+class Headers {
+ public:
+  const Result<ImageInfo>& Get(const std::string& path) {
+    auto found = headers_.find(path);
+    if (found == headers_.end()) found = headers_.emplace(path, ReadImageInfo(path)).first;
+    return found->second;
+  }
+
+ private:
+  std::map<std::string, Result<ImageInfo>> headers_;
+};
+
+// Files that share the words before the map's name.
+struct Group {
+  std::vector<std::string> words;
+  std::string tile;
+  std::string stem;
+  std::vector<const Candidate*> own;
+  std::vector<const Candidate*> borrowed;
+
+  bool HasAlbedo() const {
+    return std::any_of(own.begin(), own.end(), [](const Candidate* candidate) {
+      return std::string_view(candidate->name.token->parts[0].role) == "albedo";
+    });
+  }
+};
+
+class FolderFinder {
+ public:
+  explicit FolderFinder(std::string folder) : folder_(std::move(folder)) {}
+
+  Result<std::vector<MapSet>> Run() {
+    PATINA_TRY(List());
+    RecogniseNames();
+    AdoptUnsuffixedColors();
+    DropWeakNames();
+    if (candidates_.empty()) return NothingFound();
+    MakeGroups();
+    return MakeSets();
+  }
+
+ private:
+  Status List() {
+    std::error_code error;
+    const fs::file_status status = fs::status(folder_, error);
+    if (!fs::exists(status)) {
+      return Fail(ErrorCode::kNotFound,
+                  folder_ + ": no such folder; name a folder of texture maps");
+    }
+    if (!fs::is_directory(status)) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  folder_ + ": not a folder; name a folder of texture maps");
+    }
+    fs::directory_iterator entry(folder_, error), end;
+    for (; !error && entry != end; entry.increment(error)) {
+      std::error_code ignored;
+      const std::string file = entry->path().filename().string();
+      if (file[0] != '.' && entry->is_regular_file(ignored)) files_.push_back(file);
+    }
+    if (error)
+      return Fail(ErrorCode::kIo, folder_ + ": cannot list the folder: " + error.message());
+    std::sort(files_.begin(), files_.end());
+    return {};
+  }
+
+  void Note(MapNote::Kind kind, const std::string& file, const std::string& text) {
+    notes_.push_back({kind, file, text});
+  }
+  void Ignore(const std::string& file, const std::string& why) {
+    Note(MapNote::Kind::kIgnored, file, why);
+  }
+
+  void RecogniseNames() {
+    for (const std::string& file : files_) {
+      if (!HasImageExtension(file)) {
+        Ignore(file, "not an image of a format that is read");
+        continue;
+      }
+      Candidate candidate;
+      candidate.file = file;
+      candidate.path = (fs::path(folder_) / file).string();
+      candidate.name = ParseMapName(fs::path(file).stem().string());
+      if (candidate.name.token == nullptr) {
+        unknown_.push_back(std::move(candidate));
+        continue;
+      }
+      if (candidate.name.bare_number) {
+        candidate.guessed = true;
+        candidate.because = "a number follows the map's name";
+      }
+      candidates_.push_back(std::move(candidate));
+    }
+  }
+
+  // "rock.png" beside "rock_normal.png" is the base colour, as is "rusty_metal.png" beside
+  // "rusty_metal_n.png".
+  void AdoptUnsuffixedColors() {
+    const auto has_albedo = [&](const std::vector<std::string>& words) {
+      return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& other) {
+        return std::string_view(other.name.token->parts[0].role) == "albedo" &&
+               other.name.stem_words == words;
+      });
+    };
+    const auto is_stem = [&](const Candidate& candidate) {
+      const auto& words = candidate.name.all_words;
+      return !words.empty() &&
+             std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& other) {
+               return &other != &candidate && other.name.stem_words == words;
+             });
+    };
+    const auto adopt = [&](Candidate* candidate) {
+      candidate->guessed = true;
+      candidate->because = "the name is the material's own, and no other file is its base colour";
+      candidate->name.stem_words = candidate->name.all_words;
+      candidate->name.stem = fs::path(candidate->file).stem().string();
+      candidate->name.token = FindMapToken("albedo");
+    };
+    for (Candidate& candidate : candidates_) {
+      if (candidate.name.token->weak && is_stem(candidate) && !has_albedo(candidate.name.all_words))
+        adopt(&candidate);
+    }
+    std::vector<Candidate> adopted;
+    for (Candidate& candidate : unknown_) {
+      if (is_stem(candidate) && !has_albedo(candidate.name.all_words)) {
+        adopt(&candidate);
+        adopted.push_back(candidate);
+      } else {
+        Ignore(candidate.file, "no word at the end of its name says what map it is");
+      }
+    }
+    for (Candidate& candidate : adopted) candidates_.push_back(std::move(candidate));
+    std::sort(candidates_.begin(), candidates_.end(),
+              [](const Candidate& a, const Candidate& b) { return a.file < b.file; });
+  }
+
+  // Words that also name materials count only beside a map that cannot be mistaken, or beside
+  // another of the same stem.
+  void DropWeakNames() {
+    const bool any_strong =
+        std::any_of(candidates_.begin(), candidates_.end(),
+                    [](const Candidate& candidate) { return !candidate.name.token->weak; });
+    std::erase_if(candidates_, [&, all = candidates_](const Candidate& candidate) {
+      if (!candidate.name.token->weak || any_strong) return false;
+      const auto same_stem = std::count_if(all.begin(), all.end(), [&](const Candidate& other) {
+        return other.name.stem_words == candidate.name.stem_words;
+      });
+      if (same_stem > 1) return false;
+      Ignore(candidate.file,
+             "nothing but the word \"" + candidate.name.token->name + "\" says what map it is");
+      return true;
+    });
+    for (Candidate& candidate : candidates_) {
+      if (!candidate.name.token->weak || candidate.guessed) continue;
+      const auto strong_sibling =
+          std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& other) {
+            return !other.name.token->weak && other.name.stem_words == candidate.name.stem_words;
+          });
+      if (strong_sibling && candidate.name.token->name.size() > 1) continue;
+      candidate.guessed = true;
+      candidate.because = "the word \"" + candidate.name.token->name + "\" may mean something else";
+    }
+  }
+
+  tl::unexpected<Error> NothingFound() const {
+    constexpr size_t kListed = 20;
+    std::string list;
+    for (size_t i = 0; i < std::min(files_.size(), kListed); ++i)
+      list += (i == 0 ? "" : ", ") + files_[i];
+    if (files_.size() > kListed)
+      list += ", and " + std::to_string(files_.size() - kListed) + " more";
+    if (files_.empty()) list = "none";
+    return Fail(ErrorCode::kNotFound,
+                folder_ + ": no map is recognised by its name. Files: " + list +
+                    ". A name must end in a word for the map, before any resolution: " +
+                    KnownTokensText() + "; or list the maps with --maps");
+  }
+
+  void MakeGroups() {
+    std::map<std::pair<std::vector<std::string>, std::string>, Group> by_stem;
+    for (const Candidate& candidate : candidates_) {
+      Group& group = by_stem[{candidate.name.stem_words, candidate.name.tile}];
+      group.words = candidate.name.stem_words;
+      group.tile = candidate.name.tile;
+      if (group.stem.empty()) group.stem = candidate.name.stem;
+      group.own.push_back(&candidate);
+    }
+    for (auto& [key, group] : by_stem)
+      (group.HasAlbedo() ? colored_ : rest_).push_back(std::move(group));
+    DropVariants();
+    if (colored_.empty()) {
+      // No base colour at all: one set of everything.
+      colored_.push_back(std::move(rest_.front()));
+      rest_.erase(rest_.begin());
+    }
+    for (const Group& group : rest_) Lend(group);
+  }
+
+  // A group that is nothing but another base colour for a material that has its own maps.
+  void DropVariants() {
+    std::erase_if(colored_, [&](const Group& group) {
+      if (group.own.size() != 1) return false;
+      for (const Group& other : colored_) {
+        if (&other == &group || other.own.size() < 2 || other.tile != group.tile) continue;
+        if (!StartsWith(group.words, other.words) || other.words.empty()) continue;
+        Ignore(group.own[0]->file,
+               "another base colour for " + other.stem + ", which has " + AlbedoOf(other)->file);
+        return true;
+      }
+      return false;
+    });
+  }
+
+  static const Candidate* AlbedoOf(const Group& group) {
+    for (const Candidate* candidate : group.own) {
+      if (std::string_view(candidate->name.token->parts[0].role) == "albedo") return candidate;
+    }
+    return group.own[0];
+  }
+
+  void Lend(const Group& group) {
+    const std::vector<std::string> words = WithoutSharedWords(group.words);
+    bool lent = false;
+    for (Group& target : colored_) {
+      if (colored_.size() > 1 && !StartsWith(target.words, words) &&
+          !StartsWith(words, target.words))
+        continue;
+      if (colored_.size() > 1 && !group.tile.empty() && group.tile != target.tile) continue;
+      target.borrowed.insert(target.borrowed.end(), group.own.begin(), group.own.end());
+      lent = true;
+    }
+    if (lent) return;
+    for (const Candidate* candidate : group.own) {
+      Ignore(candidate->file, "the folder holds several materials and its name fits none of them");
+    }
+  }
+
+  Result<std::vector<MapSet>> MakeSets() {
+    std::string folder_name = fs::path(folder_).lexically_normal().filename().string();
+    if (folder_name.empty() || folder_name == ".") {
+      std::error_code error;
+      const fs::path absolute = fs::canonical(folder_, error);
+      folder_name = error ? "material" : absolute.filename().string();
+    }
+    std::vector<MapSet> sets;
+    const std::vector<MapNote> common = std::move(notes_);
+    for (const Group& group : colored_) {
+      notes_.clear();
+      MapSet set;
+      set.folder = folder_;
+      set.name = folder_name;
+      if (colored_.size() > 1) {
+        if (!group.stem.empty()) set.name += "_" + group.stem;
+        if (!group.tile.empty()) set.name += "_" + group.tile;
+      }
+      PATINA_TRY(FillSet(group, &set));
+      set.notes = std::move(notes_);
+      set.notes.insert(set.notes.end(), common.begin(), common.end());
+      std::stable_sort(set.notes.begin(), set.notes.end(),
+                       [](const MapNote& a, const MapNote& b) { return a.file < b.file; });
+      sets.push_back(std::move(set));
+    }
+    return sets;
+  }
+
+  Status FillSet(const Group& group, MapSet* set) {
+    std::map<int, std::vector<Claim>> claims;
+    PATINA_TRY(AddClaims(group.own, false, &claims));
+    PATINA_TRY(AddClaims(group.borrowed, true, &claims));
+    for (auto& [role, of_role] : claims) {
+      PATINA_ASSIGN(const Claim best, Decide(MapRoles()[role].name, of_role));
+      const Candidate& candidate = *best.candidate;
+      MapSource source;
+      source.role = best.part.role;
+      source.path = candidate.path;
+      source.file = candidate.file;
+      source.channels = best.part.channels;
+      source.color_space = candidate.name.color_space;
+      source.convention = candidate.name.convention;
+      source.invert = best.part.invert;
+      source.optional = best.part.optional;
+      set->maps.push_back(std::move(source));
+      std::string text = best.part.role;
+      if (best.part.invert) text += " (inverted)";
+      if (best.part.channels[0] != '\0') text += std::string(" from ") + best.part.channels;
+      if (best.part.optional) text += ", unless it is 1 everywhere";
+      if (candidate.guessed) text += ": " + candidate.because;
+      Note(candidate.guessed ? MapNote::Kind::kGuessed : MapNote::Kind::kFound, candidate.file,
+           text);
+    }
+    return {};
+  }
+
+  // Looks into headers where the number of channels decides what a file holds.
+  Status AddClaims(const std::vector<const Candidate*>& candidates, bool borrowed,
+                   std::map<int, std::vector<Claim>>* claims) {
+    for (const Candidate* candidate : candidates) {
+      const MapToken& token = *candidate->name.token;
+      const Result<ImageInfo>& info = headers_.Get(candidate->path);
+      if (!info) return Fail(info.error());
+      const bool wide = info->loaded_channels >= 3 && !token.wide_parts.empty();
+      const std::vector<TokenPart>& parts = wide ? token.wide_parts : token.parts;
+      for (size_t i = 0; i < parts.size(); ++i) {
+        TokenPart part = parts[i];
+        if (!HasChannels(*info, part, i == 0)) {
+          if (!part.optional) {
+            Ignore(candidate->file, std::string("no channel for ") + part.role + " in a file of " +
+                                        std::to_string(info->loaded_channels));
+          }
+          continue;
+        }
+        if (i == 0 && info->loaded_channels < 3)
+          part.channels = "";  // grey: whatever it holds is the first map
+        const int rank = part.optional ? kAlphaRank : token.rank;
+        (*claims)[MapRoleIndex(part.role)].push_back({candidate, part, rank, borrowed});
+      }
+    }
+    return {};
+  }
+
+  static bool HasChannels(const ImageInfo& info, const TokenPart& part, bool first) {
+    if (first) return true;
+    for (const char* letter = part.channels; *letter != '\0'; ++letter) {
+      if (*letter == 'a' ? !info.has_alpha() : info.loaded_channels < 3) return false;
+    }
+    return true;
+  }
+
+  Result<Claim> Decide(const std::string& role, std::vector<Claim> claims) {
+    // What is plainly preferred, by name alone.
+    const auto preference = [](const Claim& claim) {
+      const MapName& name = claim.candidate->name;
+      const int convention = name.convention == NormalConvention::kOpenGl    ? 0
+                             : name.convention == NormalConvention::kDirectX ? 1
+                                                                             : 2;
+      return std::make_tuple(claim.borrowed ? 1 : 0, claim.rank, convention, name.level_of_detail,
+                             name.variant);
+    };
+    std::stable_sort(claims.begin(), claims.end(),
+                     [&](const Claim& a, const Claim& b) { return preference(a) < preference(b); });
+    std::vector<Claim> equal;
+    for (const Claim& claim : claims) {
+      if (preference(claim) == preference(claims[0])) {
+        equal.push_back(claim);
+      } else {
+        ReportLoser(role, claim, claims[0]);
+      }
+    }
+    if (equal.size() == 1) return equal[0];
+    for (const Claim& claim : equal) {
+      if (claim.candidate->name.token == equal[0].candidate->name.token &&
+          (!claim.borrowed ||
+           claim.candidate->name.stem_words == equal[0].candidate->name.stem_words)) {
+        continue;
+      }
+      return Conflict(role, equal[0], claim);
+    }
+    // The same map several times: by what is in the files.
+    const auto worth = [&](const Claim& claim) {
+      const ImageInfo& info = *headers_.Get(claim.candidate->path);
+      return std::make_tuple(-static_cast<int64_t>(info.width) * info.height, -DepthOf(info),
+                             FormatOrder(claim.candidate->file));
+    };
+    std::stable_sort(equal.begin(), equal.end(),
+                     [&](const Claim& a, const Claim& b) { return worth(a) < worth(b); });
+    if (worth(equal[0]) == worth(equal[1])) return Conflict(role, equal[0], equal[1]);
+    for (size_t i = 1; i < equal.size(); ++i) {
+      Ignore(equal[i].candidate->file,
+             "the same map as " + equal[0].candidate->file + ", which is larger or more precise");
+    }
+    return equal[0];
+  }
+
+  tl::unexpected<Error> Conflict(const std::string& role, const Claim& a, const Claim& b) const {
+    return Fail(ErrorCode::kConflict,
+                folder_ + ": both " + a.candidate->file + " and " + b.candidate->file +
+                    " claim to be the " + role +
+                    " map; remove or rename one, or list the maps with --maps");
+  }
+
+  void ReportLoser(const std::string& role, const Claim& loser, const Claim& winner) {
+    if (loser.candidate == winner.candidate || loser.part.optional) return;
+    Ignore(loser.candidate->file, role + " is taken from " + winner.candidate->file);
+  }
+
+  std::string folder_;
+  std::vector<std::string> files_;
+  std::vector<Candidate> candidates_;
+  std::vector<Candidate> unknown_;
+  std::vector<Group> colored_;
+  std::vector<Group> rest_;
+  std::vector<MapNote> notes_;
+  Headers headers_;
+};
+
+Status CheckChannels(const std::string& where, const MapRole& role, const std::string& channels) {
+  const auto fail = [&](const std::string& wanted) {
+    return Fail(ErrorCode::kInvalidArgument, where + ": channels \"" + channels + "\" do not fit " +
+                                                 role.name + "; give " + wanted +
+                                                 " of the letters r, g, b, a, or leave them out");
+  };
+  if (channels.find_first_not_of("rgba") != std::string::npos) return fail("some");
+  const size_t count = channels.size();
+  switch (role.kind) {
+    case MapKind::kColor:
+      if (count != 0 && count != 1 && count != 3) return fail("three (or one for grey)");
+      break;
+    case MapKind::kNormal:
+      if (count != 0 && count != 2 && count != 3) return fail("three (or two: z follows)");
+      break;
+    case MapKind::kScalar:
+      if (count > 1) return fail("one");
+      break;
+    case MapKind::kVector2:
+      if (count != 0 && count != 2) return fail("two");
+      break;
+  }
+  return {};
+}
+
+}  // namespace
+
+const char* MapNoteKindName(MapNote::Kind kind) {
+  switch (kind) {
+    case MapNote::Kind::kFound:
+      return "found";
+    case MapNote::Kind::kGuessed:
+      return "guessed";
+    case MapNote::Kind::kIgnored:
+      return "ignored";
+  }
+  return "found";
+}
+
+bool HasImageExtension(const std::string& file_name) {
+  static const std::set<std::string> known = {".png",  ".jpg", ".jpeg", ".tga", ".tif",
+                                              ".tiff", ".exr", ".hdr",  ".dds"};
+  return known.count(LowerExtension(file_name)) != 0;
+}
+
+Result<std::vector<MapSet>> FindMaps(const std::string& folder) {
+  return FolderFinder(folder).Run();
+}
+
+Result<MapSet> ResolveMaps(const std::vector<MapRequest>& requests, const std::string& base_folder,
+                           const std::string& name) {
+  if (requests.empty()) {
+    return Fail(ErrorCode::kInvalidArgument, "the list of maps is empty; name at least one map");
+  }
+  MapSet set;
+  set.name = name;
+  set.folder = base_folder;
+  for (size_t i = 0; i < requests.size(); ++i) {
+    const MapRequest& request = requests[i];
+    const std::string where = "maps[" + std::to_string(i) + "]";
+    MapSource source;
+    source.file = request.file;
+    source.path = (fs::path(base_folder) / request.file).string();
+    source.color_space = request.color_space;
+    source.convention = request.convention;
+    source.convention_from_name = false;
+    if (request.file.empty()) return Fail(ErrorCode::kInvalidArgument, where + ": no file named");
+    auto info = ReadImageInfo(source.path);
+    if (!info) return Fail(std::move(info).error(), where);
+
+    std::vector<TokenPart> parts;
+    const MapToken* token = FindMapToken(request.role);
+    const MapRole* role = FindMapRole(request.role);
+    if (role != nullptr) {
+      PATINA_TRY(CheckChannels(where, *role, request.channels));
+      parts.push_back({role->name, request.channels.c_str(), request.invert});
+    } else if (token != nullptr && token->rank == kPackedRank && request.channels.empty() &&
+               !request.invert) {
+      parts = info->loaded_channels >= 3 && !token->wide_parts.empty() ? token->wide_parts
+                                                                       : token->parts;
+    } else {
+      std::string roles;
+      for (const MapRole& known : MapRoles())
+        roles += std::string(roles.empty() ? "" : ", ") + known.name;
+      return Fail(ErrorCode::kInvalidArgument,
+                  where + ": unknown role \"" + request.role + "\"; roles are " + roles +
+                      ", and orm, arm, rma, metallicsmoothness, ... without channels");
+    }
+    for (const TokenPart& part : parts) {
+      source.role = part.role;
+      source.channels = part.channels;
+      source.invert = part.invert;
+      source.optional = part.optional;
+      for (const char letter : source.channels) {
+        const int index = static_cast<int>(std::string_view("rgba").find(letter));
+        if (index >= info->loaded_channels && info->loaded_channels != 2) {
+          return Fail(ErrorCode::kInvalidArgument, where + ": " + request.file +
+                                                       " has no channel " + letter + " (it has " +
+                                                       std::to_string(info->loaded_channels) + ")");
+        }
+      }
+      for (const MapSource& other : set.maps) {
+        if (other.role == source.role) {
+          return Fail(ErrorCode::kConflict, where + ": " + request.file + " and " + other.file +
+                                                " are both given as the " + source.role +
+                                                " map; keep one");
+        }
+      }
+      set.maps.push_back(source);
+      set.notes.push_back({MapNote::Kind::kFound, source.file, source.role + " (listed)"});
+    }
+  }
+  std::stable_sort(set.maps.begin(), set.maps.end(), [](const MapSource& a, const MapSource& b) {
+    return MapRoleIndex(a.role) < MapRoleIndex(b.role);
+  });
+  return set;
+}
+
+}  // namespace patina

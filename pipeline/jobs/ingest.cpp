@@ -1,0 +1,64 @@
+#include "pipeline/jobs/ingest.h"
+
+#include "formats/base/sha256.h"
+
+namespace patina {
+namespace {
+
+Result<std::vector<std::string>> HashFiles(const std::vector<std::string>& paths, const CancelToken& cancel) {
+  std::vector<std::string> hashes;
+  for (const std::string& path : paths) {
+    if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
+    PATINA_ASSIGN(FileDigest digest, Sha256OfFile(path));
+    hashes.push_back(std::move(digest.sha256));
+  }
+  return hashes;
+}
+
+}  // namespace
+
+Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool, const CancelToken& cancel,
+                             ProgressSink& progress) {
+  ReferenceOptions options;
+  options.address = job.address;
+  options.normal_convention = ParseNormalConvention(job.normal_convention).value_or(NormalConvention::kAuto);
+  options.repair_nonfinite = job.repair_nonfinite;
+  options.widen_roughness = job.toksvig;
+  options.cancel = &cancel;
+
+  // Hashed before and after reading: a file that is still being copied must not get a container under a wrong name.
+  std::vector<std::string> set_paths;
+  for (const MapSource& map : set.maps) set_paths.push_back(map.path);
+  PATINA_ASSIGN(const std::vector<std::string> before, HashFiles(set_paths, cancel));
+  JobSource source;
+  PATINA_ASSIGN(source.reference, BuildReference(set, options, pool, progress));
+  std::vector<std::string> paths;
+  for (const ReferenceFile& file : source.reference.files) paths.push_back(file.path);
+  PATINA_ASSIGN(source.sha256, HashFiles(paths, cancel));
+  for (size_t i = 0; i < paths.size(); ++i) {
+    for (size_t m = 0; m < set_paths.size(); ++m) {
+      if (set_paths[m] == paths[i] && before[m] != source.sha256[i]) {
+        return Fail(ErrorCode::kConflict, paths[i] + ": it changed while it was read; bake again when it is complete");
+      }
+    }
+  }
+  source.fingerprint = FingerprintOf(job, source.reference, source.sha256);
+  return source;
+}
+
+std::string FingerprintOf(const Job& job, const SourceReference& reference, const std::vector<std::string>& sha256) {
+  Sha256 hash;
+  hash.Update("patina material\nrecipe " + std::to_string(kRecipeVersion) + "\njob " + CanonicalJob(job) + "\n");
+  for (const ReferenceMap& map : reference.maps) {
+    std::string line = "map " + map.role;
+    line += " " + (map.file < 0 ? std::string("none") : sha256[static_cast<size_t>(map.file)]);
+    for (const int channel : map.file_channels) line += " " + std::to_string(channel);
+    line += map.inverted ? " inverted" : "";
+    line += map.srgb ? " srgb" : " linear";
+    line += std::string(" ") + NormalConventionName(map.convention) + "\n";
+    hash.Update(line);
+  }
+  return hash.FinishHex();
+}
+
+}  // namespace patina

@@ -1,0 +1,30 @@
+// The source of a job in memory, and the fingerprint of what it was made from.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "pipeline/base/progress.h"
+#include "pipeline/base/thread_pool.h"
+#include "pipeline/jobs/job.h"
+#include "pipeline/material/reference.h"
+
+namespace patina {
+
+struct JobSource {
+  SourceReference reference;
+  std::vector<std::string> sha256;  // of reference.files, in their order
+  std::string fingerprint;          // see FingerprintOf
+};
+
+// Reads the maps of a set as the job wants them.
+// Errors: those of BuildReference; kConflict when a file changed while it was read.
+Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool, const CancelToken& cancel,
+                             ProgressSink& progress);
+
+// SHA-256 of what decides the bytes of the container: recipe version, canonical job, and for each map its role, the hash of
+// its file and how it is read. Not: where the files lie, what they are called, and when they were written.
+std::string FingerprintOf(const Job& job, const SourceReference& reference, const std::vector<std::string>& sha256);
+
+}  // namespace patina

@@ -1,0 +1,403 @@
+#include "pipeline/jobs/job.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "formats/base/file_io.h"
+
+namespace patina {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string Shown(const Json& value) {
+  constexpr size_t kLongest = 60;
+  std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
+  if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
+  return text;
+}
+
+std::string EscapePointer(std::string_view key) {
+  std::string out;
+  for (const char c : key) {
+    if (c == '~') {
+      out += "~0";
+    } else if (c == '/') {
+      out += "~1";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+// Parses JSON, refusing what the library would let through: a key that stands twice in one object, and nesting so deep
+// that printing the value would exhaust the stack.
+Result<Json> ParseJson(std::string_view text, const std::string& source) {
+  constexpr int kDeepest = 16;
+  std::vector<std::set<std::string>> keys;
+  std::string twice;
+  bool too_deep = false;
+  auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    too_deep = too_deep || depth > kDeepest;
+    if (too_deep) return false;
+    if (event == Json::parse_event_t::object_start) {
+      keys.emplace_back();
+    } else if (event == Json::parse_event_t::object_end) {
+      keys.pop_back();
+    } else if (event == Json::parse_event_t::key) {
+      std::string key = parsed.get<std::string>();
+      if (!keys.back().insert(key).second && twice.empty()) twice = std::move(key);
+    }
+    return true;
+  };
+  Json json;
+  try {
+    json = Json::parse(text.begin(), text.end(), watch);
+  } catch (const Json::exception& e) {
+    return Fail(ErrorCode::kInvalidArgument, source + ": not JSON: " + e.what());
+  }
+  if (too_deep) {
+    return Fail(ErrorCode::kInvalidArgument,
+                source + ": nested deeper than " + std::to_string(kDeepest) + " levels, which no job is");
+  }
+  if (!twice.empty()) {
+    return Fail(ErrorCode::kInvalidArgument, source + ": the key \"" + twice + "\" stands twice in one object; keep one");
+  }
+  return json;
+}
+
+// Walks one object, noting everything that is wrong with it.
+class ObjectReader {
+ public:
+  ObjectReader(const Json& object, std::string pointer, std::vector<std::string>* problems)
+      : object_(object), pointer_(std::move(pointer)), problems_(problems) {}
+
+  void Complain(const std::string& key, const std::string& what) {
+    problems_->push_back(pointer_ + "/" + EscapePointer(key) + ": " + what);
+  }
+
+  // The member, noted as known; null if absent.
+  const Json* Find(const std::string& key, bool required = false) {
+    known_.insert(key);
+    const auto it = object_.find(key);
+    if (it != object_.end()) return &*it;
+    if (required) Complain(key, "is missing");
+    return nullptr;
+  }
+
+  void Text(const std::string& key, bool required, size_t longest, std::string* out) {
+    const Json* value = Find(key, required);
+    if (value == nullptr) return;
+    if (!value->is_string()) return Complain(key, "must be a string; is " + Shown(*value));
+    const std::string& text = value->get_ref<const std::string&>();
+    if (text.empty()) return Complain(key, "must not be empty");
+    // The schema counts characters; a limit for bytes would refuse text that the schema accepts.
+    const auto characters = std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
+    if (static_cast<size_t>(characters) > longest) {
+      return Complain(key, "is longer than " + std::to_string(longest) + " characters");
+    }
+    if (text.find('\0') != std::string::npos) return Complain(key, "contains a NUL character");
+    *out = text;
+  }
+
+  void Choice(const std::string& key, std::initializer_list<const char*> choices, std::string* out) {
+    const Json* value = Find(key);
+    if (value == nullptr) return;
+    std::string list;
+    for (const char* choice : choices) {
+      if (*value == choice) {
+        *out = choice;
+        return;
+      }
+      list += (list.empty() ? "" : ", ") + std::string(choice);
+    }
+    Complain(key, "must be one of " + list + "; is " + Shown(*value));
+  }
+
+  void Number(const std::string& key, double most, double* out) {
+    const Json* value = Find(key);
+    if (value == nullptr) return;
+    if (!value->is_number()) return Complain(key, "must be a number; is " + Shown(*value));
+    const double number = value->get<double>();
+    if (!(number >= 0 && number <= most)) {
+      return Complain(key, "must be between 0 and " + Shown(Json(most)) + "; is " + Shown(*value));
+    }
+    *out = number;
+  }
+
+  void Integer(const std::string& key, uint64_t most, uint64_t* out) {
+    const Json* value = Find(key);
+    if (value == nullptr) return;
+    // JSON and its Schema know no difference between 1 and 1.0.
+    uint64_t number = 0;
+    bool good = false;
+    if (value->is_number_unsigned()) {
+      number = value->get<uint64_t>();
+      good = number <= most;
+    } else if (value->is_number_float()) {
+      const double real = value->get<double>();
+      good = real >= 0 && real <= static_cast<double>(most) && real == std::floor(real);
+      if (good) number = static_cast<uint64_t>(real);
+    }
+    if (!good) {
+      return Complain(key, "must be a whole number between 0 and " + std::to_string(most) + "; is " + Shown(*value));
+    }
+    *out = number;
+  }
+
+  void Flag(const std::string& key, bool* out) {
+    const Json* value = Find(key);
+    if (value == nullptr) return;
+    if (!value->is_boolean()) return Complain(key, "must be true or false; is " + Shown(*value));
+    *out = value->get<bool>();
+  }
+
+  void RefuseUnknown() {
+    for (const auto& [key, value] : object_.items()) {
+      if (known_.count(key) == 0) Complain(key, "is not a field of this object; fields: " + Known());
+    }
+  }
+
+ private:
+  std::string Known() const {
+    std::string list;
+    for (const std::string& key : known_) list += (list.empty() ? "" : ", ") + key;
+    return list;
+  }
+
+  const Json& object_;
+  std::string pointer_;
+  std::vector<std::string>* problems_;
+  std::set<std::string> known_;
+};
+
+std::string Join(const std::string& folder, const std::string& path) {
+  if (folder.empty() || path.empty() || path.front() == '/') return path;
+  return folder.back() == '/' ? folder + path : folder + "/" + path;
+}
+
+std::vector<JobMap> ReadMaps(const Json& list, const std::string& pointer, std::vector<std::string>* problems) {
+  std::vector<JobMap> maps;
+  if (!list.is_array() || list.empty() || list.size() > kMaxJobMaps) {
+    problems->push_back((pointer.empty() ? "/" : pointer) + ": must be an array of 1 to " + std::to_string(kMaxJobMaps) +
+                        " maps; is " + Shown(list));
+    return maps;
+  }
+  for (size_t i = 0; i < list.size(); ++i) {
+    const std::string here = pointer + "/" + std::to_string(i);
+    if (!list[i].is_object()) {
+      problems->push_back(here + ": must be an object; is " + Shown(list[i]));
+      continue;
+    }
+    ObjectReader reader(list[i], here, problems);
+    JobMap map;
+    reader.Text("role", true, 64, &map.role);
+    reader.Text("file", true, 4096, &map.file);
+    if (const Json* channels = reader.Find("channels")) {
+      const std::string text = channels->is_string() ? channels->get<std::string>() : "";
+      if (text.empty() || text.size() > 4 || text.find_first_not_of("rgba") != std::string::npos) {
+        reader.Complain("channels", "must be 1 to 4 of the letters r, g, b and a; is " + Shown(*channels));
+      } else {
+        map.channels = text;
+      }
+    }
+    reader.Choice("color_space", {"auto", "srgb", "linear", "raw"}, &map.color_space);
+    reader.Choice("convention", {"auto", "opengl", "directx"}, &map.convention);
+    reader.Flag("invert", &map.invert);
+    reader.RefuseUnknown();
+    maps.push_back(std::move(map));
+  }
+  return maps;
+}
+
+tl::unexpected<Error> FailWithProblems(const std::string& source, const std::vector<std::string>& problems) {
+  std::string message = source + ": " + std::to_string(problems.size()) +
+                        (problems.size() == 1 ? " problem" : " problems") + " (see schemas/job.schema.json)";
+  for (const std::string& problem : problems) message += "\n  " + problem;
+  return Fail(ErrorCode::kInvalidArgument, std::move(message));
+}
+
+std::string LastComponent(const std::string& path) {
+  const size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? path : path.substr(slash + 1);
+}
+
+template <class Enum, class Parse>
+void AssignEnum(const std::string& name, Parse parse, Enum* out) {
+  if (name.empty()) return;
+  if (auto value = parse(name)) *out = *value;
+}
+
+}  // namespace
+
+const char* AddressModeName(AddressMode mode) { return mode == AddressMode::kWrap ? "wrap" : "clamp"; }
+
+bool IsAssetName(std::string_view name) {
+  if (name.empty() || name.size() > 100 || name[0] == '-' || name[0] == '.') return false;
+  return std::all_of(name.begin(), name.end(), [](char c) {
+    return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+  });
+}
+
+std::string AssetNameFromPath(const std::string& path) {
+  std::string trimmed = std::filesystem::path(path).lexically_normal().string();
+  while (trimmed.size() > 1 && trimmed.back() == '/') trimmed.pop_back();
+  std::string name = LastComponent(trimmed);
+  if (name == "." || name == ".." || name.empty()) {
+    std::error_code ignored;
+    name = LastComponent(std::filesystem::weakly_canonical(trimmed, ignored).string());
+  }
+  for (char& c : name) {
+    if (!IsAssetName(std::string_view(&c, 1)) && c != '-' && c != '.') c = '_';
+  }
+  if (name.size() > 100) name.resize(100);
+  while (!name.empty() && (name[0] == '-' || name[0] == '.')) name.erase(0, 1);
+  return name.empty() ? "asset" : name;
+}
+
+std::string FolderOfFile(const std::string& path) {
+  const size_t slash = path.find_last_of('/');
+  if (slash == std::string::npos) return "";
+  return slash == 0 ? "/" : path.substr(0, slash);
+}
+
+Result<Job> ParseJob(std::string_view text, const std::string& base_folder, const std::string& source) {
+  PATINA_ASSIGN(const Json json, ParseJson(text, source));
+  if (!json.is_object()) {
+    return Fail(ErrorCode::kInvalidArgument, source + ": a job is a JSON object; this is " + Shown(json));
+  }
+  std::vector<std::string> problems;
+  ObjectReader reader(json, "", &problems);
+  if (const Json* version = reader.Find("version", true)) {
+    if (version->is_number_integer() && version->get<int64_t>() > kJobVersion) {
+      return Fail(ErrorCode::kUnsupported, source + ": /version: this program knows jobs up to version " +
+                                               std::to_string(kJobVersion) + "; this one is version " + Shown(*version) +
+                                               "; use a newer patina");
+    }
+    if (*version != kJobVersion) reader.Complain("version", "must be 1; is " + Shown(*version));
+  }
+  if (const Json* kind = reader.Find("kind", true)) {
+    if (*kind != "material") reader.Complain("kind", "must be \"material\"; is " + Shown(*kind));
+  }
+
+  Job job;
+  reader.Text("asset", true, 100, &job.asset);
+  if (!job.asset.empty() && !IsAssetName(job.asset)) {
+    reader.Complain("asset", "must be made of A-Z a-z 0-9 _ - . and not start with - or '.'; is " + Shown(Json(job.asset)));
+  }
+  reader.Text("folder", false, 4096, &job.folder);
+  reader.Text("set", false, 255, &job.set);
+  if (const Json* maps = reader.Find("maps")) job.maps = ReadMaps(*maps, "/maps", &problems);
+  if (!json.contains("folder") && !json.contains("maps")) reader.Complain("folder", "is missing: give \"folder\" or \"maps\"");
+  reader.Text("out", true, 4096, &job.out);
+  std::string profile, quality, recipe, address;
+  reader.Choice("profile", {"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
+  reader.Choice("quality", {"preview", "standard", "reference"}, &quality);
+  reader.Choice("recipe", {"patina", "paper"}, &recipe);
+  reader.Choice("address", {"wrap", "clamp"}, &address);
+  reader.Choice("normal_convention", {"auto", "opengl", "directx"}, &job.normal_convention);
+  reader.Integer("seed", kMaxSeed, &job.seed);
+  uint64_t threads = 0;
+  reader.Integer("threads", kMaxThreads, &threads);
+  reader.Number("target_psnr_db", 100, &job.target_psnr_db);
+  reader.Number("time_budget_s", 1e6, &job.time_budget_s);
+  reader.Number("samples", 1e12, &job.samples);
+  reader.Number("min_psnr_db", 100, &job.min_psnr_db);
+  reader.Flag("repair_nonfinite", &job.repair_nonfinite);
+  reader.Flag("toksvig", &job.toksvig);
+  reader.RefuseUnknown();
+  if (!problems.empty()) return FailWithProblems(source, problems);
+
+  job.threads = static_cast<int>(threads);
+  AssignEnum(profile, ParseProfile, &job.profile);
+  AssignEnum(quality, ParseQuality, &job.quality);
+  AssignEnum(recipe, ParseRecipe, &job.recipe);
+  if (address == "clamp") job.address = AddressMode::kClamp;
+  job.folder = Join(base_folder, job.folder);
+  job.out = Join(base_folder, job.out);
+  job.maps_folder = job.folder.empty() ? base_folder : job.folder;
+  return job;
+}
+
+Result<Job> ReadJobFile(const std::string& path) {
+  PATINA_ASSIGN(const std::string text, ReadTextFile(path, kMaxJobBytes));
+  return ParseJob(text, FolderOfFile(path), path);
+}
+
+Result<std::vector<JobMap>> ReadMapListFile(const std::string& path) {
+  PATINA_ASSIGN(const std::string text, ReadTextFile(path, kMaxJobBytes));
+  PATINA_ASSIGN(const Json json, ParseJson(text, path));
+  std::vector<std::string> problems;
+  std::vector<JobMap> maps = ReadMaps(json, "", &problems);
+  if (!problems.empty()) return FailWithProblems(path, problems);
+  return maps;
+}
+
+std::string JobToJson(const Job& job) {
+  const Job defaults;
+  nlohmann::ordered_json json;
+  json["version"] = kJobVersion;
+  json["kind"] = "material";
+  json["asset"] = job.asset;
+  if (!job.folder.empty()) json["folder"] = job.folder;
+  if (!job.set.empty()) json["set"] = job.set;
+  for (const JobMap& map : job.maps) {
+    nlohmann::ordered_json entry;
+    entry["role"] = map.role;
+    entry["file"] = map.file;
+    if (!map.channels.empty()) entry["channels"] = map.channels;
+    if (map.color_space != "auto") entry["color_space"] = map.color_space;
+    if (map.convention != "auto") entry["convention"] = map.convention;
+    if (map.invert) entry["invert"] = true;
+    json["maps"].push_back(std::move(entry));
+  }
+  json["out"] = job.out;
+  if (job.profile != defaults.profile) json["profile"] = ProfileName(job.profile);
+  if (job.quality != defaults.quality) json["quality"] = QualityName(job.quality);
+  if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
+  if (job.seed != defaults.seed) json["seed"] = job.seed;
+  if (job.threads != defaults.threads) json["threads"] = job.threads;
+  if (job.target_psnr_db > 0) json["target_psnr_db"] = job.target_psnr_db;
+  if (job.time_budget_s > 0) json["time_budget_s"] = job.time_budget_s;
+  if (job.samples > 0) json["samples"] = job.samples;
+  if (job.min_psnr_db > 0) json["min_psnr_db"] = job.min_psnr_db;
+  if (job.address != defaults.address) json["address"] = AddressModeName(job.address);
+  if (job.normal_convention != defaults.normal_convention) json["normal_convention"] = job.normal_convention;
+  if (job.repair_nonfinite) json["repair_nonfinite"] = true;
+  if (!job.toksvig) json["toksvig"] = false;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string CanonicalJob(const Job& job) {
+  nlohmann::ordered_json json;
+  json["version"] = kJobVersion;
+  json["kind"] = "material";
+  json["asset"] = job.asset;
+  json["maps"] = nlohmann::ordered_json::array();
+  for (const JobMap& map : job.maps) {
+    json["maps"].push_back({{"role", map.role},
+                            {"file", LastComponent(map.file)},
+                            {"channels", map.channels},
+                            {"color_space", map.color_space},
+                            {"convention", map.convention},
+                            {"invert", map.invert}});
+  }
+  json["profile"] = ProfileName(job.profile);
+  json["quality"] = QualityName(job.quality);
+  json["recipe"] = RecipeName(job.recipe);
+  json["seed"] = job.seed;
+  json["target_psnr_db"] = job.target_psnr_db;
+  json["time_budget_s"] = job.time_budget_s;
+  json["samples"] = job.samples;
+  json["address"] = AddressModeName(job.address);
+  json["normal_convention"] = job.normal_convention;
+  json["repair_nonfinite"] = job.repair_nonfinite;
+  json["toksvig"] = job.toksvig;
+  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+}
+
+}  // namespace patina

@@ -1,0 +1,58 @@
+// How a job ended: the content of result.json and of `--json`. Described by schemas/result.schema.json.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+
+namespace patina {
+
+// Exit codes of the program; never reused for another meaning.
+enum ExitCode : int {
+  kExitDone = 0,
+  kExitFailed = 1,
+  kExitUsage = 2,
+  kExitBadInput = 3,
+  kExitQualityGate = 4,
+  kExitInterrupted = 130
+};
+
+// The PSNRs of schemas/result.schema.json, in dB.
+struct PsnrSummary {
+  double overall_db = 0;
+  double mip0_db = 0;
+  double mean_mips_db = 0;
+  std::vector<std::pair<std::string, double>> maps;  // role -> dB over all mips, in the manifest's order
+};
+
+struct JobResult {
+  int exit_code = kExitDone;
+  std::optional<Error> error;  // set exactly when exit_code is not kExitDone
+  std::string error_stage;     // where; may be empty
+  std::string asset;
+  std::string container;    // folder of the published container, or of the rejected one; else empty
+  std::string revision;     // empty if not published
+  std::string fingerprint;  // empty if the input could not be read
+  std::string profile, quality, recipe;
+  uint64_t seed = 0;
+  double seconds = 0;
+  double cpu_seconds = 0;
+  double samples = 0;
+  std::string stopped_by;
+  uint64_t bytes = 0;  // of features and weights
+  std::optional<PsnrSummary> psnr;
+  std::optional<double> ssim, flip, normal_angle_deg;
+  std::vector<std::string> warnings;
+};
+
+// The result as JSON: one line without a line break if indent < 0, else indented by so many blanks.
+std::string JobResultToJson(const JobResult& result, int indent);
+
+// The exit code for an error that came while input was read (`reading_input`) or later.
+int ExitCodeFor(const Error& error, bool reading_input);
+
+}  // namespace patina

@@ -1,0 +1,133 @@
+#include "pipeline/jobs/job_sets.h"
+
+#include <algorithm>
+#include <filesystem>
+
+namespace patina {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Folder {
+  std::vector<std::string> subfolders;  // sorted, hidden ones left out
+  bool has_images = false;
+};
+
+Result<Folder> ListFolder(const std::string& path) {
+  Folder folder;
+  std::error_code error;
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    std::error_code ignored;
+    if (entry->is_directory(ignored)) {
+      if (name[0] != '.') folder.subfolders.push_back(entry->path().string());
+    } else if (HasImageExtension(name)) {
+      folder.has_images = true;
+    }
+  }
+  if (error) return Fail(ErrorCode::kIo, "cannot list the folder " + path + ": " + error.message());
+  std::sort(folder.subfolders.begin(), folder.subfolders.end());
+  return folder;
+}
+
+void AddSets(const std::string& folder, const std::vector<MapSet>& sets, FoundAssets* found) {
+  for (const MapSet& set : sets) {
+    FoundAsset asset;
+    asset.asset = AssetNameFromPath(set.name);
+    asset.folder = folder;
+    if (sets.size() > 1) asset.set = set.name;
+    found->assets.push_back(std::move(asset));
+  }
+}
+
+std::string Names(const std::vector<MapSet>& sets) {
+  std::string names;
+  for (const MapSet& set : sets) names += (names.empty() ? "" : ", ") + set.name;
+  return names;
+}
+
+// A file's name for the manifest, without where it lies on this machine.
+std::string PortableName(const std::string& file) {
+  const fs::path path = fs::path(file).lexically_normal();
+  return path.is_absolute() || *path.begin() == ".." ? path.filename().string() : path.generic_string();
+}
+
+bool SameFolder(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  return !b.empty() && fs::equivalent(a, b, ignored);
+}
+
+}  // namespace
+
+Result<MapSet> MapsOfJob(const Job& job) {
+  if (!job.maps.empty()) {
+    std::vector<MapRequest> requests;
+    for (const JobMap& map : job.maps) {
+      MapRequest request;
+      request.role = map.role;
+      request.file = map.file;
+      request.channels = map.channels;
+      // The parser has let no other names through.
+      request.color_space = ParseColorSpace(map.color_space).value_or(ColorSpace::kAuto);
+      request.convention = ParseNormalConvention(map.convention).value_or(NormalConvention::kAuto);
+      request.invert = map.invert;
+      requests.push_back(std::move(request));
+    }
+    PATINA_ASSIGN(MapSet set, ResolveMaps(requests, job.maps_folder, job.asset));
+    for (MapSource& map : set.maps) map.file = PortableName(map.file);
+    for (MapNote& note : set.notes) note.file = PortableName(note.file);
+    return set;
+  }
+  PATINA_ASSIGN(std::vector<MapSet> sets, FindMaps(job.folder));
+  if (job.set.empty()) {
+    if (sets.size() == 1) return std::move(sets[0]);
+    return Fail(ErrorCode::kInvalidArgument, "the folder " + job.folder + " holds several materials: " + Names(sets) +
+                                                 "; name one in the job's \"set\", or bake the folder with `patina bake`");
+  }
+  for (MapSet& set : sets) {
+    if (set.name == job.set) return std::move(set);
+  }
+  return Fail(ErrorCode::kNotFound, "the folder " + job.folder + " holds no material named \"" + job.set +
+                                        "\"; it holds " + Names(sets));
+}
+
+Result<FoundAssets> FindAssets(const std::string& folder, const std::string& except) {
+  std::error_code error;
+  const fs::file_status status = fs::status(folder, error);
+  if (!fs::exists(status)) return Fail(ErrorCode::kNotFound, "there is no folder " + folder + "; check the path");
+  if (!fs::is_directory(status)) {
+    return Fail(ErrorCode::kInvalidArgument, folder + " is neither a folder nor a job file (*.json)");
+  }
+  FoundAssets found;
+  auto sets = FindMaps(folder);
+  if (sets) {
+    AddSets(folder, *sets, &found);
+    return found;
+  }
+  if (sets.error().code != ErrorCode::kNotFound) return Fail(sets.error());
+
+  PATINA_ASSIGN(const Folder content, ListFolder(folder));
+  for (const std::string& subfolder : content.subfolders) {
+    if (SameFolder(subfolder, except)) continue;
+    auto inner = FindMaps(subfolder);
+    if (inner) {
+      AddSets(subfolder, *inner, &found);
+      continue;
+    }
+    auto listed = ListFolder(subfolder);
+    if (listed && !listed->has_images) {
+      found.skipped.push_back(subfolder);
+      continue;
+    }
+    FoundAsset asset;
+    asset.asset = AssetNameFromPath(subfolder);
+    asset.folder = subfolder;
+    asset.problem = inner.error().message;
+    asset.problem_code = inner.error().code;
+    found.assets.push_back(std::move(asset));
+  }
+  if (found.assets.empty()) return Fail(sets.error());
+  return found;
+}
+
+}  // namespace patina

@@ -1,0 +1,28 @@
+// From a trained material to the payloads and the manifest of a container.
+#pragma once
+
+#include "formats/base/result.h"
+#include "formats/container.h"
+#include "formats/manifest.h"
+#include "pipeline/jobs/ingest.h"
+#include "pipeline/jobs/job.h"
+#include "pipeline/jobs/measure.h"
+#include "pipeline/material/train.h"
+
+namespace patina {
+
+// Adds features_0.dds ... and decoder.weights. Errors: those of EncodeDds, PackNetwork and StagingArea::AddPayload;
+// kInternal in place of kInvalidArgument, since what was trained must be writable.
+Status AddModel(const TrainedMaterial& model, StagingArea* staging);
+
+// The manifest of a container, without its quality. model: null when every channel is constant.
+// Files whose names cannot stand in a manifest appear under similar ones.
+Manifest DescribeContainer(const Job& job, const JobSource& source, const TrainedMaterial* model);
+
+// Fills in manifest.quality; the gate is job.min_psnr_db.
+void DescribeQuality(const Job& job, const Measurement& measurement, Manifest* manifest);
+
+// Bytes of the payloads that an engine loads: features and weights.
+uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads);
+
+}  // namespace patina

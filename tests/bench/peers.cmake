@@ -1,0 +1,18 @@
+# The codecs that Patina is compared with: not part of it, and built only where they are installed.
+find_path(PATINA_SQUISH_INCLUDE squish.h)
+find_library(PATINA_SQUISH_LIBRARY squish)
+find_package(nlohmann_json REQUIRED)
+find_package(Python3 COMPONENTS Interpreter REQUIRED)
+if(PATINA_SQUISH_INCLUDE AND PATINA_SQUISH_LIBRARY)
+  add_library(patina_peer_codecs STATIC peer_astc.cpp peer_bc.cpp peer_textures.cpp)
+  target_include_directories(patina_peer_codecs PRIVATE ${PATINA_SQUISH_INCLUDE})
+  target_link_libraries(patina_peer_codecs PUBLIC patina_reference patina_image patina_metrics patina_color
+    ${PATINA_SQUISH_LIBRARY})
+  add_executable(patina_peers peers.cpp)
+  target_link_libraries(patina_peers PRIVATE patina_peer_codecs nlohmann_json::nlohmann_json)
+  patina_add_test(NAME peers_test SOURCES peers_test.cpp LIBS patina_peer_codecs)
+else()
+  message(STATUS "libsquish-dev is not installed: patina_peers is not built")
+endif()
+add_test(NAME bake_sets_test COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_SOURCE_DIR}/bake_sets_test.py)
+set_tests_properties(bake_sets_test PROPERTIES TIMEOUT 60)
