@@ -96,6 +96,7 @@ ordered_json ChannelsToJson(const std::vector<ManifestChannel>& channels) {
     entry["map"] = channel.map;
     entry["component"] = channel.component;
     entry["encoding"] = channel.encoding;
+    if (channel.scale != 1.0f) entry["scale"] = FloatAsWritten(channel.scale);
     entry["range"] = {FloatAsWritten(channel.range_min), FloatAsWritten(channel.range_max)};
     if (channel.output >= 0) {
       entry["output"] = channel.output;
@@ -238,6 +239,7 @@ void ReadChannels(const JsonView& json, JsonProblem* problem,
     channel.map = entry.Field("map").String();
     channel.component = entry.Field("component").String();
     channel.encoding = entry.Field("encoding").String();
+    if (const JsonView scale = entry.Optional("scale")) channel.scale = scale.Float();
     std::vector<float> range;
     entry.Field("range").ForEach(2, [&](const JsonView& bound) { range.push_back(bound.Float()); });
     if (range.size() == 2) {

@@ -86,6 +86,7 @@ struct ManifestChannel {
   std::string component;  // "r", "g", "b", "x", "y", or "" for a map of one channel
   std::string encoding =
       "linear";         // "linear", "srgb" or "normal_xy": coded value -> physical value
+  float scale = 1;      // of "linear": physical value = coded value * scale; > 0
   float range_min = 0;  // coded; decoders clamp to it
   float range_max = 1;
   int output = -1;     // output of the network, or -1 for a constant

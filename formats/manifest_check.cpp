@@ -176,6 +176,10 @@ Status CheckChannels(const Manifest& manifest) {
       return Bad(at + "/component", "a normal_xy channel is \"x\" or \"y\", not " +
                                         QuoteForMessage(channel.component));
     }
+    if (!std::isfinite(channel.scale) || !(channel.scale > 0) ||
+        (channel.scale != 1.0f && channel.encoding != "linear")) {
+      return Bad(at + "/scale", "not a finite number above 0 of a \"linear\" channel");
+    }
     if (!std::isfinite(channel.range_min) || !std::isfinite(channel.range_max) ||
         channel.range_min > channel.range_max) {
       return Bad(at + "/range", "not two finite numbers in rising order");

@@ -446,7 +446,8 @@ class Decoder {
     std::string map;        // "albedo", "normal", "roughness", ...
     std::string component;  // "r", "g", "b", "x", "y" or ""
     Encoding encoding = Encoding::kLinear;
-    float min = 0;  // coded values are clamped to [min, max]
+    float scale = 1;  // kLinear: physical = coded * scale
+    float min = 0;    // coded values are clamped to [min, max]
     float max = 1;
     int output = -1;     // of the network, or -1: constant
     float constant = 0;  // coded
@@ -504,12 +505,11 @@ class Decoder {
   // Physical values, in the order of channels(): see Encoding.
   void Physical(double u, double v, double s, float* out) const {
     Coded(u, v, s, out);
-    for (size_t c = 0; c < channels_.size(); ++c)
-      out[c] = ToPhysical(channels_[c].encoding, out[c]);
+    for (size_t c = 0; c < channels_.size(); ++c) out[c] = ToPhysical(channels_[c], out[c]);
   }
 
-  static float ToPhysical(Encoding encoding, float coded) {
-    switch (encoding) {
+  static float ToPhysical(const Channel& channel, float coded) {
+    switch (channel.encoding) {
       case Encoding::kSrgb:
         return coded <= 0.04045f ? coded / 12.92f : std::pow((coded + 0.055f) / 1.055f, 2.4f);
       case Encoding::kNormalXy:
@@ -517,7 +517,7 @@ class Decoder {
       case Encoding::kLinear:
         break;
     }
-    return coded;
+    return coded * channel.scale;
   }
 
   // The third component of a normal from the physical values of the first two.
@@ -851,6 +851,10 @@ class Decoder {
       channel.encoding = encoding == "srgb"        ? Encoding::kSrgb
                          : encoding == "normal_xy" ? Encoding::kNormalXy
                                                    : Encoding::kLinear;
+      const nlohmann::json& scale = Member(entry, "scale");
+      if (!scale.is_null()) channel.scale = Real(scale);
+      if (!(channel.scale > 0))
+        return failure->Set(LoadStatus::kCorrupt, place + "/scale is not legal");
       const nlohmann::json& range = Member(entry, "range");
       if (!range.is_array() || range.size() != 2)
         return failure->Set(LoadStatus::kCorrupt, place + "/range is missing");

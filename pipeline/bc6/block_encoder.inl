@@ -371,8 +371,8 @@ inline void RefineKernel(const WeightedTarget& target, const bc6h::BlockFields& 
   Codes codes[2] = {start, {}};
   Resolve(p, tables, codes, 1, codes + 1);
   for (Codes& s : codes) Descend(p, tables, kManySteps, &s);
-  ResolveAndDescend(p, tables, codes, 2);
   SortByError(codes, 2);
+  ResolveAndDescend(p, tables, codes, 1);
   DescendFurther(p, tables, &codes[0]);
   bc6h::BlockFields found;
   const float error = WriteFields(p, tables, codes[0], &found);

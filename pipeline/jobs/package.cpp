@@ -144,6 +144,7 @@ Manifest DescribeContainer(const Job& job, const JobSource& source, const Traine
     entry.map = channel.map;
     entry.component = channel.component;
     entry.encoding = EncodingName(channel.encoding);
+    entry.scale = channel.scale;
     entry.range_min = channel.min_value;
     entry.range_max = channel.max_value;
     entry.output = channel.constant ? -1 : channel.learned_index;

@@ -59,6 +59,7 @@ Picture Assemble(const std::vector<const Decoder::Channel*>& channels, const Dec
       for (size_t c = 0; c < channels.size(); ++c) {
         const Decoder::Channel& channel = *channels[c];
         float value = channel.output < 0 ? channel.constant : mip.values[static_cast<size_t>(channel.output) * plane + i];
+        if (channel.encoding == Decoder::Encoding::kLinear) value = Decoder::ToPhysical(channel, value);
         if (color) {
           const bool coded = channel.encoding == Decoder::Encoding::kSrgb;
           if (coded && format == UnpackFormat::kExr) value = static_cast<float>(SrgbToLinear(value));

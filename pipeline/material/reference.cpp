@@ -188,6 +188,11 @@ class Builder {
         channel.max_value = ranges_[index].high;
         channel.constant = channel.min_value == channel.max_value;
         if (channel.constant) channel.constant_value = channel.min_value;
+        if (channel.encoding == Encoding::kLinear && !channel.constant) {
+          channel.scale = ScaleOfRange(channel.min_value, channel.max_value);
+          channel.min_value /= channel.scale;
+          channel.max_value /= channel.scale;
+        }
         channel.learned_index = channel.constant ? -1 : learned++;
         result_.material.channels.push_back(std::move(channel));
       }
@@ -220,6 +225,23 @@ class Builder {
       map.resized = file.resized;
       result_.maps.push_back(std::move(map));
     }
+  }
+
+  // Coded values of ordinary maps are their own; those far above 1 or below it are brought near 1 by
+  // a power of two, which is exact both ways.
+  static float ScaleOfRange(float low, float high) {
+    const float largest = std::max(std::abs(low), std::abs(high));
+    if (largest <= 1.0f && largest >= 0x1p-10f) return 1.0f;
+    return std::clamp(std::exp2(std::ceil(std::log2(largest))), 0x1p-100f, 0x1p100f);
+  }
+
+  // Writes a row of one channel, divided by its scale.
+  void StoreScaledRow(TargetLevel* level, int y, int channel, float* coded) const {
+    const float scale = result_.material.channels[channel].scale;
+    if (scale != 1.0f) {
+      for (int x = 0; x < level->width; ++x) coded[x] /= scale;
+    }
+    StoreRow(level, y, Learned(channel), coded);
   }
 
   // Where the planes and channels of a map are.
@@ -309,7 +331,7 @@ class Builder {
             } else {
               std::copy_n(s.planes[c], width, s.coded.data());
             }
-            StoreRow(&mip0, row, channel, s.coded.data());
+            StoreScaledRow(&mip0, row, places[p].channel + c, s.coded.data());
           }
           for (int i = 0; i < plan.work_planes(); ++i) {
             if (plan.encoding == Encoding::kSrgb) SrgbToLinearRow(s.planes[i], width, s.planes[i]);
@@ -360,8 +382,8 @@ class Builder {
           if (Learned(place.channel + c) < 0) continue;
           EncodeRow(p, c, level, y, place, scales[p],
                     widening[p] < 0 ? -1 : places[widening[p]].plane, coded);
+          StoreScaledRow(target, y, place.channel + c, coded);
           ranges[y * channels + place.channel + c].Add(coded, width);
-          StoreRow(target, y, Learned(place.channel + c), coded);
         }
       }
     });

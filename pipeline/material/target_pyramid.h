@@ -15,7 +15,7 @@ enum class AddressMode { kWrap, kClamp };
 
 // How a learned ("coded") value relates to the physical one. Names reach the manifest.
 enum class Encoding {
-  kLinear,    // coded = value: data maps in [0,1], and colour that came linear (float files)
+  kLinear,    // coded = value / scale: data maps, and colour that came linear (float files)
   kSrgb,      // coded = sRGB transfer curve of linear Rec.709 reflectance
   kNormalXy   // coded = 0.5 + 0.5 * x of a unit tangent-space normal, OpenGL (Y up); z = sqrt(1 - x^2 - y^2)
 };
@@ -28,6 +28,7 @@ struct TargetChannel {
   Encoding encoding = Encoding::kLinear;
   bool constant = false;   // every texel of mip 0 has constant_value exactly: not learned
   float constant_value = 0;  // coded
+  float scale = 1;         // kLinear only: a power of two that brings coded values near [-1, 1], where half weights hold them
   float min_value = 0;     // range of mip 0, coded; decoders clamp to it
   float max_value = 1;
   int learned_index = -1;  // channel of the TargetPyramid, or -1 when constant

@@ -257,14 +257,22 @@ TEST(Decoder, TakesAnyCoordinates) {
   }
 }
 
+Decoder::Channel ChannelOf(Decoder::Encoding encoding, float scale = 1) {
+  Decoder::Channel channel;
+  channel.encoding = encoding;
+  channel.scale = scale;
+  return channel;
+}
+
 TEST(Decoder, GivesPhysicalValues) {
-  EXPECT_EQ(Decoder::ToPhysical(Decoder::Encoding::kLinear, 0.3f), 0.3f);
-  EXPECT_EQ(Decoder::ToPhysical(Decoder::Encoding::kNormalXy, 0.75f), 0.5f);
-  EXPECT_EQ(Decoder::ToPhysical(Decoder::Encoding::kSrgb, 0.0f), 0.0f);
-  EXPECT_FLOAT_EQ(Decoder::ToPhysical(Decoder::Encoding::kSrgb, 1.0f), 1.0f);
-  EXPECT_NEAR(Decoder::ToPhysical(Decoder::Encoding::kSrgb, 0.5f), 0.21404114,
+  EXPECT_EQ(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kLinear, 65536.0f), 0.5f), 32768.0f);
+  EXPECT_EQ(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kLinear), 0.3f), 0.3f);
+  EXPECT_EQ(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kNormalXy), 0.75f), 0.5f);
+  EXPECT_EQ(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kSrgb), 0.0f), 0.0f);
+  EXPECT_FLOAT_EQ(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kSrgb), 1.0f), 1.0f);
+  EXPECT_NEAR(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kSrgb), 0.5f), 0.21404114,
               1e-7);  // IEC 61966-2-1
-  EXPECT_NEAR(Decoder::ToPhysical(Decoder::Encoding::kSrgb, 0.04f), 0.04 / 12.92, 1e-9);
+  EXPECT_NEAR(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kSrgb), 0.04f), 0.04 / 12.92, 1e-9);
   EXPECT_FLOAT_EQ(Decoder::NormalZ(0.6f, 0.0f), 0.8f);
   EXPECT_EQ(Decoder::NormalZ(0.9f, 0.9f), 0.0f);
 

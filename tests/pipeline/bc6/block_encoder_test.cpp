@@ -143,8 +143,10 @@ TEST(Encode, GainsWhatTheExporterCountsOn) {
 }
 
 // With a cost on one channel only, the best 6-bit block of a partition can be found by trying all pairs of codes.
-TEST(Encode, BeatsAnExhaustiveSearchOfTheSixBitMode) {
-  for (uint64_t seed = 0; seed < 12; ++seed) {
+TEST(Encode, StandsUpToAnExhaustiveSearchOfTheSixBitMode) {
+  double log_ratio = 0;
+  constexpr int kSeeds = 16;
+  for (uint64_t seed = 0; seed < kSeeds; ++seed) {
     BlockSample sample = MakeBlockSample(seed);
     for (int q = 1; q < 6; ++q) std::fill(sample.target.hessian[q], sample.target.hessian[q] + 16, 0.0f);
     const unsigned mask = bc6h::PartitionMask(sample.current.partition);
@@ -173,8 +175,11 @@ TEST(Encode, BeatsAnExhaustiveSearchOfTheSixBitMode) {
     // The same mode and partition, from the rounded block: the search over codes alone.
     bc6h::BlockFields start;
     ASSERT_TRUE(RoundSoftBlock(sample.current, bc6h::kModeSixBit, &start));
-    EXPECT_LE(static_cast<double>(Refine(sample.target, start).error), 1.25 * (best[0] + best[1])) << seed;
+    const double ratio = static_cast<double>(Refine(sample.target, start).error) / (best[0] + best[1]);
+    EXPECT_GE(ratio, 1 - 1e-5) << seed;
+    log_ratio += std::log(ratio) / kSeeds;
   }
+  EXPECT_LT(std::exp(log_ratio), 1.1);  // measured: 1.05
 }
 
 // Blocks that a mode can represent exactly, for every mode, partition and so every anchor rule.
