@@ -34,7 +34,6 @@ enum Offset : int {
   kPixelFormatFlagsAt = 80,
   kFourCcAt = 84,
   kCapsAt = 108,
-  kCaps2At = 112,
   kDxgiFormatAt = 128,
   kDimensionAt = 132,
   kMiscFlagAt = 136,

@@ -4,11 +4,12 @@
 // One header, C++17, needs only the standard library and nlohmann/json: copy it into a renderer. It
 // reads what FORMATS.md describes and shares no code with the rest of Patina.
 //
-//   patina::Decoder material;
+//   using patina::Decoder;
+//   Decoder material;
 //   std::string problem;
-//   if (patina::Decoder::Load("out/cobblestone", &material, &problem) !=
-//   patina::Decoder::LoadStatus::kOk) { ... } std::vector<float>
-//   values(material.channels().size()); material.Physical(0.25, 0.75, 1.5, values.data());
+//   if (Decoder::Load("out/cobblestone", &material, &problem) != Decoder::LoadStatus::kOk) return;
+//   std::vector<float> values(material.channels().size());
+//   material.Physical(0.25, 0.75, 1.5, values.data());
 //
 // A loaded decoder is immutable: all its const members may be called from many threads at once.
 // Load does not throw.
@@ -43,113 +44,52 @@ struct Bc6hMode {
   bool deltas;  // endpoints 1..3 are stored relative to endpoint 0
   int bits;     // of endpoint 0, and of all once deltas are added
   int delta_bits[3];
-  // Order of the stored bits after the mode bits: colour, endpoint, [high:low]; [10:15] stores bit
-  // 15 first.
+  // Stored bits after the mode bits: colour, endpoint, [high:low]; [10:15] stores bit 15 first.
   const char* layout;
 };
 
 inline const std::array<Bc6hMode, 14>& Bc6hModes() {
+  // clang-format off
   static const std::array<Bc6hMode, 14> modes = {{
-      {0x00,
-       true,
-       true,
-       10,
-       {5, 5, 5},
-       "g2[4]b2[4]b3[4]r0[9:0]g0[9:0]b0[9:0]r1[4:0]g3[4]g2[3:0]g1[4:0]b3[0]g3[3:0]b1[4:0]b3[1]b2[3:"
-       "0]r2[4:0]b3[2]"
-       "r3[4:0]b3[3]"},
-      {0x01,
-       true,
-       true,
-       7,
-       {6, 6, 6},
-       "g2[5]g3[4]g3[5]r0[6:0]b3[0]b3[1]b2[4]g0[6:0]b2[5]b3[2]g2[4]b0[6:0]b3[3]b3[5]b3[4]r1[5:0]g2["
-       "3:0]g1[5:0]"
-       "g3[3:0]b1[5:0]b2[3:0]r2[5:0]r3[5:0]"},
-      {0x02,
-       true,
-       true,
-       11,
-       {5, 4, 4},
-       "r0[9:0]g0[9:0]b0[9:0]r1[4:0]r0[10]g2[3:0]g1[3:0]g0[10]b3[0]g3[3:0]b1[3:0]b0[10]b3[1]b2[3:0]"
-       "r2[4:0]b3[2]"
-       "r3[4:0]b3[3]"},
-      {0x06,
-       true,
-       true,
-       11,
-       {4, 5, 4},
-       "r0[9:0]g0[9:0]b0[9:0]r1[3:0]r0[10]g3[4]g2[3:0]g1[4:0]g0[10]g3[3:0]b1[3:0]b0[10]b3[1]b2[3:0]"
-       "r2[3:0]b3[0]"
-       "b3[2]r3[3:0]g2[4]b3[3]"},
-      {0x0A,
-       true,
-       true,
-       11,
-       {4, 4, 5},
-       "r0[9:0]g0[9:0]b0[9:0]r1[3:0]r0[10]b2[4]g2[3:0]g1[3:0]g0[10]b3[0]g3[3:0]b1[4:0]b0[10]b2[3:0]"
-       "r2[3:0]b3[1]"
-       "b3[2]r3[3:0]b3[4]b3[3]"},
-      {0x0E,
-       true,
-       true,
-       9,
-       {5, 5, 5},
-       "r0[8:0]b2[4]g0[8:0]g2[4]b0[8:0]b3[4]r1[4:0]g3[4]g2[3:0]g1[4:0]b3[0]g3[3:0]b1[4:0]b3[1]b2[3:"
-       "0]r2[4:0]b3[2]"
-       "r3[4:0]b3[3]"},
-      {0x12,
-       true,
-       true,
-       8,
-       {6, 5, 5},
-       "r0[7:0]g3[4]b2[4]g0[7:0]b3[2]g2[4]b0[7:0]b3[3]b3[4]r1[5:0]g2[3:0]g1[4:0]b3[0]g3[3:0]b1[4:0]"
-       "b3[1]b2[3:0]"
-       "r2[5:0]r3[5:0]"},
-      {0x16,
-       true,
-       true,
-       8,
-       {5, 6, 5},
-       "r0[7:0]b3[0]b2[4]g0[7:0]g2[5]g2[4]b0[7:0]g3[5]b3[4]r1[4:0]g3[4]g2[3:0]g1[5:0]g3[3:0]b1[4:0]"
-       "b3[1]b2[3:0]"
-       "r2[4:0]b3[2]r3[4:0]b3[3]"},
-      {0x1A,
-       true,
-       true,
-       8,
-       {5, 5, 6},
-       "r0[7:0]b3[1]b2[4]g0[7:0]b2[5]g2[4]b0[7:0]b3[5]b3[4]r1[4:0]g3[4]g2[3:0]g1[4:0]b3[0]g3[3:0]"
-       "b1[5:0]b2[3:0]"
-       "r2[4:0]b3[2]r3[4:0]b3[3]"},
-      {0x1E,
-       true,
-       false,
-       6,
-       {6, 6, 6},
-       "r0[5:0]g3[4]b3[0]b3[1]b2[4]g0[5:0]g2[5]b2[5]b3[2]g2[4]b0[5:0]g3[5]b3[3]b3[5]b3[4]r1[5:0]g2["
-       "3:0]g1[5:0]"
-       "g3[3:0]b1[5:0]b2[3:0]r2[5:0]r3[5:0]"},
+      {0x00, true, true, 10, {5, 5, 5},
+       "g2[4]b2[4]b3[4]r0[9:0]g0[9:0]b0[9:0]r1[4:0]g3[4]g2[3:0]g1[4:0]b3[0]g3[3:0]b1[4:0]b3[1]"
+       "b2[3:0]r2[4:0]b3[2]r3[4:0]b3[3]"},
+      {0x01, true, true, 7, {6, 6, 6},
+       "g2[5]g3[4]g3[5]r0[6:0]b3[0]b3[1]b2[4]g0[6:0]b2[5]b3[2]g2[4]b0[6:0]b3[3]b3[5]b3[4]r1[5:0]"
+       "g2[3:0]g1[5:0]g3[3:0]b1[5:0]b2[3:0]r2[5:0]r3[5:0]"},
+      {0x02, true, true, 11, {5, 4, 4},
+       "r0[9:0]g0[9:0]b0[9:0]r1[4:0]r0[10]g2[3:0]g1[3:0]g0[10]b3[0]g3[3:0]b1[3:0]b0[10]b3[1]"
+       "b2[3:0]r2[4:0]b3[2]r3[4:0]b3[3]"},
+      {0x06, true, true, 11, {4, 5, 4},
+       "r0[9:0]g0[9:0]b0[9:0]r1[3:0]r0[10]g3[4]g2[3:0]g1[4:0]g0[10]g3[3:0]b1[3:0]b0[10]b3[1]"
+       "b2[3:0]r2[3:0]b3[0]b3[2]r3[3:0]g2[4]b3[3]"},
+      {0x0A, true, true, 11, {4, 4, 5},
+       "r0[9:0]g0[9:0]b0[9:0]r1[3:0]r0[10]b2[4]g2[3:0]g1[3:0]g0[10]b3[0]g3[3:0]b1[4:0]b0[10]"
+       "b2[3:0]r2[3:0]b3[1]b3[2]r3[3:0]b3[4]b3[3]"},
+      {0x0E, true, true, 9, {5, 5, 5},
+       "r0[8:0]b2[4]g0[8:0]g2[4]b0[8:0]b3[4]r1[4:0]g3[4]g2[3:0]g1[4:0]b3[0]g3[3:0]b1[4:0]b3[1]"
+       "b2[3:0]r2[4:0]b3[2]r3[4:0]b3[3]"},
+      {0x12, true, true, 8, {6, 5, 5},
+       "r0[7:0]g3[4]b2[4]g0[7:0]b3[2]g2[4]b0[7:0]b3[3]b3[4]r1[5:0]g2[3:0]g1[4:0]b3[0]g3[3:0]"
+       "b1[4:0]b3[1]b2[3:0]r2[5:0]r3[5:0]"},
+      {0x16, true, true, 8, {5, 6, 5},
+       "r0[7:0]b3[0]b2[4]g0[7:0]g2[5]g2[4]b0[7:0]g3[5]b3[4]r1[4:0]g3[4]g2[3:0]g1[5:0]g3[3:0]"
+       "b1[4:0]b3[1]b2[3:0]r2[4:0]b3[2]r3[4:0]b3[3]"},
+      {0x1A, true, true, 8, {5, 5, 6},
+       "r0[7:0]b3[1]b2[4]g0[7:0]b2[5]g2[4]b0[7:0]b3[5]b3[4]r1[4:0]g3[4]g2[3:0]g1[4:0]b3[0]"
+       "g3[3:0]b1[5:0]b2[3:0]r2[4:0]b3[2]r3[4:0]b3[3]"},
+      {0x1E, true, false, 6, {6, 6, 6},
+       "r0[5:0]g3[4]b3[0]b3[1]b2[4]g0[5:0]g2[5]b2[5]b3[2]g2[4]b0[5:0]g3[5]b3[3]b3[5]b3[4]r1[5:0]"
+       "g2[3:0]g1[5:0]g3[3:0]b1[5:0]b2[3:0]r2[5:0]r3[5:0]"},
       {0x03, false, false, 10, {10, 10, 10}, "r0[9:0]g0[9:0]b0[9:0]r1[9:0]g1[9:0]b1[9:0]"},
-      {0x07,
-       false,
-       true,
-       11,
-       {9, 9, 9},
+      {0x07, false, true, 11, {9, 9, 9},
        "r0[9:0]g0[9:0]b0[9:0]r1[8:0]r0[10]g1[8:0]g0[10]b1[8:0]b0[10]"},
-      {0x0B,
-       false,
-       true,
-       12,
-       {8, 8, 8},
+      {0x0B, false, true, 12, {8, 8, 8},
        "r0[9:0]g0[9:0]b0[9:0]r1[7:0]r0[10:11]g1[7:0]g0[10:11]b1[7:0]b0[10:11]"},
-      {0x0F,
-       false,
-       true,
-       16,
-       {4, 4, 4},
+      {0x0F, false, true, 16, {4, 4, 4},
        "r0[9:0]g0[9:0]b0[9:0]r1[3:0]r0[10:15]g1[3:0]g0[10:15]b1[3:0]b0[10:15]"},
   }};
+  // clang-format on
   return modes;
 }
 

@@ -34,7 +34,8 @@ BlockTables MakeTables() {
     limits.inverse_step = 1.0f / limits.step;
     limits.wide_step = std::ldexp(1.0f, 10 - info.endpoint_bits);
     limits.transformed = info.transformed;
-    for (int c = 0; c < 3; ++c) limits.half_range[c] = static_cast<float>(1 << (info.delta_bits[c] - 1));
+    for (int c = 0; c < 3; ++c)
+      limits.half_range[c] = static_cast<float>(1 << (info.delta_bits[c] - 1));
   }
   for (int table = 0; table < 2; ++table) {
     ModeLanes& lanes = tables.lanes[table];
@@ -67,12 +68,14 @@ SoftBlock SoftOf(const bc6h::BlockFields& fields, int soft_partition) {
   for (int e = 0; e < 4; ++e) {
     for (int c = 0; c < 3; ++c) {
       const int code = fields.endpoints[mode.regions == 2 ? e : e % 2][c];
-      const auto wide = static_cast<float>(bc6h::Unquantize(code, mode.endpoint_bits, bc6h::Format::kUf16));
+      const auto wide =
+          static_cast<float>(bc6h::Unquantize(code, mode.endpoint_bits, bc6h::Format::kUf16));
       soft.endpoint[e][c] = std::clamp(wide * (31.0f / 65536), 1.0f, 30.9f);
     }
   }
   for (int t = 0; t < 16; ++t) {
-    const int weight = mode.index_bits == 3 ? bc6h::kWeights3[fields.indices[t]] : bc6h::kWeights4[fields.indices[t]];
+    const int weight = mode.index_bits == 3 ? bc6h::kWeights3[fields.indices[t]]
+                                            : bc6h::kWeights4[fields.indices[t]];
     soft.index[t] = static_cast<float>(weight) * (1.0f / 64);
   }
   return soft;
@@ -119,13 +122,15 @@ void DecodeToFloat(const bc6h::BlockFields& fields, float out[3][16]) {
   int32_t wide[4][3];
   for (int e = 0; e < 2 * mode.regions; ++e) {
     for (int c = 0; c < 3; ++c) {
-      wide[e][c] = bc6h::Unquantize(fields.endpoints[e][c], mode.endpoint_bits, bc6h::Format::kUf16);
+      wide[e][c] =
+          bc6h::Unquantize(fields.endpoints[e][c], mode.endpoint_bits, bc6h::Format::kUf16);
     }
   }
   const unsigned mask = mode.regions == 2 ? bc6h::PartitionMask(fields.partition) : 0u;
   for (int t = 0; t < 16; ++t) {
     const int region = (mask >> t) & 1;
-    const int weight = mode.index_bits == 3 ? bc6h::kWeights3[fields.indices[t]] : bc6h::kWeights4[fields.indices[t]];
+    const int weight = mode.index_bits == 3 ? bc6h::kWeights3[fields.indices[t]]
+                                            : bc6h::kWeights4[fields.indices[t]];
     for (int c = 0; c < 3; ++c) {
       const int32_t value = bc6h::Interpolate(wide[2 * region][c], wide[2 * region + 1][c], weight);
       out[c][t] = HalfToFloat(bc6h::FinishUnquantize(value, bc6h::Format::kUf16));

@@ -1,9 +1,11 @@
-// The encoder: candidates, ranking, descent. Compiled for each target; see block_encoder.h for what it promises.
+// The encoder: candidates, ranking, descent. Compiled for each target; see block_encoder.h for what
+// it promises.
 //
-// A funnel, each stage dearer and surer than the one before: 32 partitions by the residual of their principal lines;
-// sixteen by least squares; their modes by the cost of rounding; sixteen by exact error; eight, four and three by
-// steepest descent on the codes, the last with another round of least squares. The sizes were tuned on the blocks of
-// tests/pipeline/bc6/block_samples.h for the best error within 25 us.
+// A funnel, each stage dearer and surer than the one before: 32 partitions by the residual of their
+// principal lines; sixteen by least squares; their modes by the cost of rounding; sixteen by exact
+// error; eight, four and three by steepest descent on the codes, the last with another round of
+// least squares. The sizes were tuned on the blocks of tests/pipeline/bc6/block_samples.h for the
+// best error within 25 us.
 
 namespace patina::PATINA_SIMD {
 namespace {
@@ -11,17 +13,19 @@ namespace {
 using bc6::SearchResult;
 
 inline constexpr int kBatches = 2;
-inline constexpr int kFits = kBatches * kBatchFits;  // the current partition, one region, and the best of the lines
-inline constexpr int kRoundedFits = 10;              // of those, the ones whose modes are looked at
-inline constexpr int kExamined = 16;                 // rounded fits whose exact error is taken
-inline constexpr int kStarted = 8;                   // of those, the ones that descend a little, ...
-inline constexpr int kContinued = 4;                 // ... a little more, ...
-inline constexpr int kFinished = 3;                  // ... and to the end,
-inline constexpr float kNearBest = 1.1f;             // if they are as near to the best as that
-inline constexpr int kFewSteps = 3;                  // channels
+inline constexpr int kFits =
+    kBatches * kBatchFits;  // the current partition, one region, and the best of the lines
+inline constexpr int kRoundedFits = 10;   // of those, the ones whose modes are looked at
+inline constexpr int kExamined = 16;      // rounded fits whose exact error is taken
+inline constexpr int kStarted = 8;        // of those, the ones that descend a little, ...
+inline constexpr int kContinued = 4;      // ... a little more, ...
+inline constexpr int kFinished = 3;       // ... and to the end,
+inline constexpr float kNearBest = 1.1f;  // if they are as near to the best as that
+inline constexpr int kFewSteps = 3;       // channels
 inline constexpr int kManySteps = 30;
 
-// What rounding to eight indices leaves of the variance along a line: 1/49 for evenly spread points, less for others.
+// What rounding to eight indices leaves of the variance along a line: 1/49 for evenly spread
+// points, less for others.
 inline constexpr float kIndexStepShare = 0.013f;
 
 inline constexpr float kMinBinades = 1.0f, kMaxBinades = 30.9f;  // of a soft block's endpoints
@@ -48,7 +52,8 @@ inline void DescendFurther(const Problem& p, const BlockTables& tables, Codes* s
   }
 }
 
-// order[k] is the place of the k-th smallest of 16 or 32 values, equals by place. Values must not be NaN.
+// order[k] is the place of the k-th smallest of 16 or 32 values, equals by place. Values must not
+// be NaN.
 template <int kCount>
 PATINA_INLINE void RankValues(const float* value, uint8_t order[kCount]) {
   const F16 low = Load(value), high = Load(value + kCount - 16);
@@ -74,12 +79,14 @@ inline void SortByError(Codes* codes, int count) {
 }
 
 PATINA_INLINE float SoftEndpoint(const bc6::SoftBlock& block, int e, int c) {
-  return std::max(kMinBinades, std::min(kMaxBinades, block.endpoint[e][c]));  // NaN becomes kMaxBinades
+  return std::max(kMinBinades,
+                  std::min(kMaxBinades, block.endpoint[e][c]));  // NaN becomes kMaxBinades
 }
 
-// The trainer's block with its endpoints rounded to the nearest codes, in each mode that holds it, with either end of
-// region 0 as the base. Returns the best.
-inline Codes BestRounding(const Problem& p, const BlockTables& tables, const bc6::SoftBlock& current, int partition) {
+// The trainer's block with its endpoints rounded to the nearest codes, in each mode that holds it,
+// with either end of region 0 as the base. Returns the best.
+inline Codes BestRounding(const Problem& p, const BlockTables& tables,
+                          const bc6::SoftBlock& current, int partition) {
   Codes best;
   bool found = false;
   for (int mode = 0; mode < 10; ++mode) {
@@ -91,12 +98,14 @@ inline Codes BestRounding(const Problem& p, const BlockTables& tables, const bc6
     for (int e = 0; e < 4; ++e) {
       for (int c = 0; c < 3; ++c) {
         // floor(endpoint / step - offset + 0.5), and the offset of these modes is 0.5
-        const auto code = static_cast<float>(static_cast<int>(SoftEndpoint(current, e, c) * limits.inverse_step));
+        const auto code =
+            static_cast<float>(static_cast<int>(SoftEndpoint(current, e, c) * limits.inverse_step));
         s.code[e][c] = std::min(code, limits.max_code);
       }
     }
     if (!Holds<8>(limits, s)) {
-      // Where both ends can be the base, they decode the same: SearchIndices then leaves the anchor free.
+      // Where both ends can be the base, they decode the same: SearchIndices then leaves the anchor
+      // free.
       for (int c = 0; c < 3; ++c) std::swap(s.code[0][c], s.code[1][c]);
       if (!Holds<8>(limits, s)) continue;
     }
@@ -107,8 +116,10 @@ inline Codes BestRounding(const Problem& p, const BlockTables& tables, const bc6
   return best;
 }
 
-// Least squares for the indices that the codes have, rounded to the same modes, with new indices. At most eight codes.
-inline void Resolve(const Problem& p, const BlockTables& tables, const Codes* codes, int count, Codes* out) {
+// Least squares for the indices that the codes have, rounded to the same modes, with new indices.
+// At most eight codes.
+inline void Resolve(const Problem& p, const BlockTables& tables, const Codes* codes, int count,
+                    Codes* out) {
   LineBatch batch;
   alignas(64) float weight[16][16] = {}, origin[3][16] = {}, span[3][16] = {};
   for (int f = 0; f < count; ++f) {
@@ -157,7 +168,8 @@ inline void Resolve(const Problem& p, const BlockTables& tables, const Codes* co
 }
 
 // Resolves codes that have descended to the end, descends again, and keeps what is better.
-inline void ResolveAndDescend(const Problem& p, const BlockTables& tables, Codes* codes, int count) {
+inline void ResolveAndDescend(const Problem& p, const BlockTables& tables, Codes* codes,
+                              int count) {
   Codes resolved[kBatchFits];
   Resolve(p, tables, codes, count, resolved);
   for (int n = 0; n < count; ++n) {
@@ -166,11 +178,14 @@ inline void ResolveAndDescend(const Problem& p, const BlockTables& tables, Codes
   }
 }
 
-// The exact error with the best indices, as given to the caller; and the fields, with anchors fixed.
-inline float WriteFields(const Problem& p, const BlockTables& tables, Codes s, bc6h::BlockFields* fields) {
+// The exact error with the best indices, as given to the caller; and the fields, with anchors
+// fixed.
+inline float WriteFields(const Problem& p, const BlockTables& tables, Codes s,
+                         bc6h::BlockFields* fields) {
   alignas(64) int32_t lane[16];
   const I16 index = Evaluate(p, tables, &s);
-  const float error = IsOneRegion(s) ? ExactError<16>(p, tables, s, index) : ExactError<8>(p, tables, s, index);
+  const float error =
+      IsOneRegion(s) ? ExactError<16>(p, tables, s, index) : ExactError<8>(p, tables, s, index);
   StoreI(lane, IsOneRegion(s) ? index : index & SetI(7));
   *fields = {};
   fields->mode = s.mode;
@@ -205,8 +220,8 @@ inline void AddLine(const BlockTables& tables, const PrincipalLines& lines, int 
 }
 
 // The trainer's own segments, whitened.
-inline void AddCurrent(const Problem& p, const BlockTables& tables, const bc6::SoftBlock& current, int partition,
-                       Fits* fits) {
+inline void AddCurrent(const Problem& p, const BlockTables& tables, const bc6::SoftBlock& current,
+                       int partition, Fits* fits) {
   LineBatch& batch = fits->batches[fits->count++ / kBatchFits];
   const int f = batch.Add(partition, tables.mask[partition], false);
   for (int r = 0; r < 2; ++r) {
@@ -226,8 +241,8 @@ inline void AddCurrent(const Problem& p, const BlockTables& tables, const bc6::S
   }
 }
 
-inline void MakeFits(const Problem& p, const BlockTables& tables, const bc6::SoftBlock& current, int partition,
-                     Fits* fits) {
+inline void MakeFits(const Problem& p, const BlockTables& tables, const bc6::SoftBlock& current,
+                     int partition, Fits* fits) {
   PrincipalLines lines;
   const F16 points[3] = {Load(p.point_of[0]), Load(p.point_of[1]), Load(p.point_of[2])};
   FindPrincipalLines(tables, points, Load(p.weight_of), kIndexStepShare, &lines);
@@ -252,14 +267,16 @@ inline void MakeFits(const Problem& p, const BlockTables& tables, const bc6::Sof
   }
 }
 
-// The fits in the modes that cost them least, by estimate, at most two modes a fit: kExamined codes in the order of
-// their exact errors. Returns their number; *soft_partition becomes the best two-region fit's partition.
-inline int ExamineModes(const Problem& p, const BlockTables& tables, const Fits& fits, Codes codes[kExamined],
-                        int* soft_partition) {
+// The fits in the modes that cost them least, by estimate, at most two modes a fit: kExamined codes
+// in the order of their exact errors. Returns their number; *soft_partition becomes the best
+// two-region fit's partition.
+inline int ExamineModes(const Problem& p, const BlockTables& tables, const Fits& fits,
+                        Codes codes[kExamined], int* soft_partition) {
   static_assert(kFits == 16);
   alignas(64) float fit_error[16];
   for (int n = 0; n < 16; ++n) {
-    const float* error = fits.systems[n / kBatchFits].error + 2 * (n % kBatchFits);  // zero without texels
+    const float* error =
+        fits.systems[n / kBatchFits].error + 2 * (n % kBatchFits);  // zero without texels
     // One region has finer indices and codes, so its modes are always worth a look.
     fit_error[n] = fits.Batch(n).one_region[n % kBatchFits] ? 0.0f : error[0] + error[1];
   }
@@ -312,7 +329,8 @@ inline int ExamineModes(const Problem& p, const BlockTables& tables, const Fits&
   return kExamined;
 }
 
-inline void EncodeKernel(const WeightedTarget& target, const bc6::SoftBlock& current, SearchResult* result) noexcept {
+inline void EncodeKernel(const WeightedTarget& target, const bc6::SoftBlock& current,
+                         SearchResult* result) noexcept {
   const BlockTables& tables = bc6::Tables();
   const int partition = std::clamp(current.partition, 0, bc6h::kPartitionCount - 1);
   Problem p;
@@ -337,7 +355,8 @@ inline void EncodeKernel(const WeightedTarget& target, const bc6::SoftBlock& cur
   result->error = WriteFields(p, tables, codes[0], &result->fields);
 
   bc6h::BlockFields plain;
-  const float plain_error = WriteFields(p, tables, BestRounding(p, tables, current, partition), &plain);
+  const float plain_error =
+      WriteFields(p, tables, BestRounding(p, tables, current, partition), &plain);
   if (plain_error < result->error) {
     result->error = plain_error;
     result->fields = plain;
@@ -357,7 +376,8 @@ inline void RefineKernel(const WeightedTarget& target, const bc6h::BlockFields& 
     for (int c = 0; c < 3; ++c) start.code[e][c] = static_cast<float>(current.endpoints[e][c]);
   }
   alignas(64) int32_t given[16];
-  for (int t = 0; t < 16; ++t) given[t] = current.indices[t] + 8 * static_cast<int>((start.mask >> t) & 1);
+  for (int t = 0; t < 16; ++t)
+    given[t] = current.indices[t] + 8 * static_cast<int>((start.mask >> t) & 1);
   const float given_error = IsOneRegion(start) ? ExactError<16>(p, tables, start, LoadI(given))
                                                : ExactError<8>(p, tables, start, LoadI(given));
   result->fields = current;

@@ -1,4 +1,5 @@
-// A block made ready for the searches: sanitised, scaled, and in binades. Compiled for each target; see simd16.h.
+// A block made ready for the searches: sanitised, scaled, and in binades. Compiled for each target;
+// see simd16.h.
 
 namespace patina::PATINA_SIMD {
 namespace {
@@ -12,30 +13,33 @@ using bc6::WeightedTarget;
 inline constexpr int kSymmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
 struct Problem {
-  F16 target[3];    // linear, within [0, 65504]
-  F16 cost[6];      // the Hessian as given, scaled
-  F16 hessian[6];   // the same plus a trace on the diagonal, so that texels that cost nothing stay near their target
+  F16 target[3];   // linear, within [0, 65504]
+  F16 cost[6];     // the Hessian as given, scaled
+  F16 hessian[6];  // the same plus a trace on the diagonal, so that texels that cost nothing stay
+                   // near their target
   F16 root[3], inverse_root[3];  // of hessian's diagonal
-  F16 position[3];  // the target in binades, minus centre
-  // For the lanes that are not texels: hessian, position, and in binades with the slope at the target
+  F16 position[3];               // the target in binades, minus centre
+  // For the lanes that are not texels: hessian, position, and in binades with the slope at the
+  // target
   alignas(64) float hessian_of[6][16];
   alignas(64) float position_of[3][16];
   alignas(64) float target_of[3][16];
   alignas(64) float slope_of[3][16];      // of the value by binades, at the target
   alignas(64) float curvature_of[6][16];  // hessian per binade squared
   alignas(64) float pull_of[3][16];       // curvature * position
-  // Points and weights in which squared distances approximate the cost: the block's mean curvature becomes the identity,
-  // and a texel counts by the size of its own curvature beside the mean.
+  // Points and weights in which squared distances approximate the cost: the block's mean curvature
+  // becomes the identity, and a texel counts by the size of its own curvature beside the mean.
   alignas(64) float point_of[3][16];
   alignas(64) float weight_of[16];
   float mean_weight;
-  float whiten[6];      // L^T by rows: 00 01 02 11 12 22
-  float centre[3];      // of the positions, binades
+  float whiten[6];  // L^T by rows: 00 01 02 11 12 22
+  float centre[3];  // of the positions, binades
   float mean_target[3];
   float inverse_scale;  // error as given = error here * inverse_scale
 };
 
-// Values in [0, 65504] to binades, and the value's change in one binade (the slope of the half's scale there).
+// Values in [0, 65504] to binades, and the value's change in one binade (the slope of the half's
+// scale there).
 PATINA_INLINE F16 ToBinades(F16 value, F16* slope) {
   const I16 bits = AsInt(value);
   const F16 fraction = AsFloat((bits & SetI(0x7FFFFF)) + SetI(0x3F800000));  // in [1, 2)
@@ -64,7 +68,9 @@ PATINA_INLINE void ScaleHessian(const F16 hessian[6], const F16 slope[3], F16 ou
   }
 }
 
-PATINA_INLINE F16 Dot(const F16 a[3], const F16 b[3]) { return MulAdd(a[2], b[2], MulAdd(a[1], b[1], a[0] * b[0])); }
+PATINA_INLINE F16 Dot(const F16 a[3], const F16 b[3]) {
+  return MulAdd(a[2], b[2], MulAdd(a[1], b[1], a[0] * b[0]));
+}
 
 // The whitening: curvature and position give points, weights and L^T with mean curvature = L L^T.
 inline void Whiten(const F16 curvature[6], Problem* p) {
@@ -78,15 +84,20 @@ inline void Whiten(const F16 curvature[6], Problem* p) {
   const float l22 = std::sqrt(std::max(mean[5] - l20 * l20 - l21 * l21, 0.0f) + ridge);
   const float whiten[6] = {l00, l10, l20, l11, l21, l22};
   std::copy(whiten, whiten + 6, p->whiten);
-  Store(p->point_of[0], MulAdd(Set(l20), p->position[2], MulAdd(Set(l10), p->position[1], Set(l00) * p->position[0])));
+  Store(p->point_of[0], MulAdd(Set(l20), p->position[2],
+                               MulAdd(Set(l10), p->position[1], Set(l00) * p->position[0])));
   Store(p->point_of[1], MulAdd(Set(l21), p->position[2], Set(l11) * p->position[1]));
   Store(p->point_of[2], Set(l22) * p->position[2]);
   // weight = trace(L^-1 curvature L^-T) / 3
   const float i00 = 1 / l00, i11 = 1 / l11, i22 = 1 / l22;
   const float i10 = -l10 * i00 * i11, i21 = -l21 * i11 * i22;
   const float i20 = (l10 * l21 * i11 - l20) * i00 * i22;
-  const float m[6] = {i00 * i00 + i10 * i10 + i20 * i20, 2 * (i10 * i11 + i20 * i21), 2 * i20 * i22,
-                      i11 * i11 + i21 * i21,             2 * i21 * i22,               i22 * i22};
+  const float m[6] = {i00 * i00 + i10 * i10 + i20 * i20,
+                      2 * (i10 * i11 + i20 * i21),
+                      2 * i20 * i22,
+                      i11 * i11 + i21 * i21,
+                      2 * i21 * i22,
+                      i22 * i22};
   F16 sum = Zero();
   for (int q = 0; q < 6; ++q) sum = MulAdd(Set(m[q]), curvature[q], sum);
   const F16 weight = Max(sum * Set(1.0f / 3), Zero());
@@ -106,10 +117,12 @@ inline void PrepareProblem(const WeightedTarget& in, Problem* p) {
     h[q] = LoadU(in.hessian[q]);
     size = size + Abs(h[q]);
   }
-  const M16 hessian_finite = size < Set(0x1p124f), value_finite = value_size < Set(0x1p127f);  // false for NaN
+  const M16 hessian_finite = size < Set(0x1p124f),
+            value_finite = value_size < Set(0x1p127f);  // false for NaN
   for (int q = 0; q < 6; ++q) h[q] = ZeroUnless(value_finite, ZeroUnless(hessian_finite, h[q]));
 
-  // Scaling by a power of two brings the largest trace into [1, 2), so that nothing below overflows or vanishes.
+  // Scaling by a power of two brings the largest trace into [1, 2), so that nothing below overflows
+  // or vanishes.
   const float largest = ReduceMax(Max(h[0] + h[3] + h[5], Zero()));
   int32_t exponent;
   std::memcpy(&exponent, &largest, 4);

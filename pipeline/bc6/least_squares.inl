@@ -1,22 +1,25 @@
-// Endpoints by weighted least squares, sixteen regions at once, and their rounding to codes. Works in binades with a
-// quadratic model of the cost, so it is an estimate; the palette search has the last word. Compiled for each target.
+// Endpoints by weighted least squares, sixteen regions at once, and their rounding to codes. Works
+// in binades with a quadratic model of the cost, so it is an estimate; the palette search has the
+// last word. Compiled for each target.
 
 namespace patina::PATINA_SIMD {
 namespace {
 
-// Eight partitions with lines for their regions: lane 2*f + r is region r of fit f. Unused lanes have no texels.
+// Eight partitions with lines for their regions: lane 2*f + r is region r of fit f. Unused lanes
+// have no texels.
 inline constexpr int kBatchFits = 8;
 
 struct LineBatch {
   int count = 0;
   int partition[kBatchFits] = {};
-  uint16_t mask[kBatchFits] = {};                 // texels of region 1
+  uint16_t mask[kBatchFits] = {};  // texels of region 1
   bool one_region[kBatchFits] = {};
-  alignas(64) int32_t texels[16] = {};            // bit t: texel t belongs to the lane's region
-  alignas(64) float levels[16] = {};              // largest index: 7 or 15
-  alignas(64) float origin[3][16] = {};           // a point of the line ...
-  alignas(64) float direction[3][16] = {};        // ... and its direction, in the whitened space
-  alignas(64) float fixed_ends[16] = {};          // 1: the segment is origin..origin + direction; 0: as long as needed
+  alignas(64) int32_t texels[16] = {};      // bit t: texel t belongs to the lane's region
+  alignas(64) float levels[16] = {};        // largest index: 7 or 15
+  alignas(64) float origin[3][16] = {};     // a point of the line ...
+  alignas(64) float direction[3][16] = {};  // ... and its direction, in the whitened space
+  alignas(64) float fixed_ends[16] =
+      {};  // 1: the segment is origin..origin + direction; 0: as long as needed
 
   // Adds a fit of two regions, or of one (mask 0), without its lines. Returns its number.
   int Add(int partition_number, unsigned region_mask, bool is_one_region) {
@@ -31,7 +34,8 @@ struct LineBatch {
   }
 };
 
-// Per texel, a lane each region: membership (0 or 1), and the weight of the second endpoint (0 for other texels).
+// Per texel, a lane each region: membership (0 or 1), and the weight of the second endpoint (0 for
+// other texels).
 struct TexelWeights {
   F16 member[16];
   F16 weight[16];
@@ -48,7 +52,8 @@ PATINA_INLINE F16 WeightOfNearestIndex(F16 position, F16 levels, F16 weights_a_l
   return ToFloat(RoundToInt(index * weights_a_level)) * Set(1.0f / 64);
 }
 
-// Turns region 0 round where texel 0 lies in its second half: the anchor rule. Call for texel 0 first.
+// Turns region 0 round where texel 0 lies in its second half: the anchor rule. Call for texel 0
+// first.
 PATINA_INLINE F16 TurnToAnchor(int t, F16 member, F16 weight, M16* turned) {
   if (t == 0) *turned = (member * weight) > Set(0.5f);
   return member * Select(*turned, Set(1.0f) - weight, weight);
@@ -82,13 +87,14 @@ inline void WeightsOnLines(const Problem& p, const LineBatch& batch, TexelWeight
   M16 turned = MaskOf(0);
   for (int t = 0; t < 16; ++t) {
     const F16 position = Min(Max((along[t] - least) * per_range, Zero()), Set(1.0f));
-    out->weight[t] =
-        TurnToAnchor(t, out->member[t], WeightOfNearestIndex(position, levels, weights_a_level), &turned);
+    out->weight[t] = TurnToAnchor(t, out->member[t],
+                                  WeightOfNearestIndex(position, levels, weights_a_level), &turned);
   }
 }
 
-// The normal equations of a batch, a lane each region. The unknowns are the second endpoint (x, y, z), then the first,
-// in binades minus the centre. factor[i*(i-1)/2 + j] is L of L D L^T, pivot is D.
+// The normal equations of a batch, a lane each region. The unknowns are the second endpoint (x, y,
+// z), then the first, in binades minus the centre. factor[i*(i-1)/2 + j] is L of L D L^T, pivot is
+// D.
 struct Systems {
   alignas(64) float solution[6][16];
   alignas(64) float factor[15][16];
@@ -144,8 +150,10 @@ PATINA_INLINE Segments SegmentsOf(const Systems& systems) {
   return s;
 }
 
-// The best index weights on given segments, by projection in the curvature at the target. Region 0 is not turned.
-inline void ProjectTexels(const Problem& p, const LineBatch& batch, const Segments& s, TexelWeights* w) {
+// The best index weights on given segments, by projection in the curvature at the target. Region 0
+// is not turned.
+inline void ProjectTexels(const Problem& p, const LineBatch& batch, const Segments& s,
+                          TexelWeights* w) {
   const F16 levels = Load(batch.levels), weights_a_level = Set(64.0f) / Max(levels, Set(1.0f));
   for (int t = 0; t < 16; ++t) {
     F16 curvature[6], pull[3], image[3];
@@ -153,14 +161,17 @@ inline void ProjectTexels(const Problem& p, const LineBatch& batch, const Segmen
     for (int c = 0; c < 3; ++c) pull[c] = Set(p.pull_of[c][t]);
     Multiply(curvature, s.span, image);
     const F16 along = Dot(s.span, pull) - Dot(image, s.origin);
-    const F16 position = Min(Max(along / Max(Dot(s.span, image), Set(0x1p-120f)), Zero()), Set(1.0f));
+    const F16 position =
+        Min(Max(along / Max(Dot(s.span, image), Set(0x1p-120f)), Zero()), Set(1.0f));
     w->weight[t] = WeightOfNearestIndex(position, levels, weights_a_level);
   }
 }
 
-// Sums with the curvature of secants between the target and the place on the segment: with them the quadratic model is
-// exact there, on whichever side of a power of two. Then region 0 is turned to its anchor.
-inline void SumAtSegments(const Problem& p, const Segments& s, const TexelWeights& w, NormalSums* out) {
+// Sums with the curvature of secants between the target and the place on the segment: with them the
+// quadratic model is exact there, on whichever side of a power of two. Then region 0 is turned to
+// its anchor.
+inline void SumAtSegments(const Problem& p, const Segments& s, const TexelWeights& w,
+                          NormalSums* out) {
   NormalSums sums;
   ClearSums(&sums);
   M16 turned = MaskOf(0);
@@ -178,7 +189,8 @@ inline void SumAtSegments(const Problem& p, const Segments& s, const TexelWeight
     const F16 run01 = run[0] * run[1];
     const F16 inverse = Set(1.0f) / (run01 * run[2]);
     const F16 inverse01 = inverse * run[2];
-    const F16 slope[3] = {rise[0] * (run[1] * inverse01), rise[1] * (run[0] * inverse01), rise[2] * (run01 * inverse)};
+    const F16 slope[3] = {rise[0] * (run[1] * inverse01), rise[1] * (run[0] * inverse01),
+                          rise[2] * (run01 * inverse)};
     const F16 member = w.member[t];
     const F16 first = TurnToAnchor(t, member, w.weight[t], &turned), second = first * first;
     F16 curvature[6], position[3], pull[3];
@@ -214,7 +226,8 @@ inline void SolveSystems(const NormalSums& sums, Systems* out) {
     rhs[3 + c] = sums.pull_all[c] - rhs[c];
   }
 
-  // A weak spring holds the endpoints together, and a weaker one holds both at the centre, where the data do not say.
+  // A weak spring holds the endpoints together, and a weaker one holds both at the centre, where
+  // the data do not say.
   const F16 trace = (aa[0] + aa[3] + aa[5]) + (cc[0] + cc[3] + cc[5]);
   const F16 spring = trace * Set(1e-6f), anchor = MulAdd(trace, Set(1e-7f), Set(1e-30f));
   F16 g[6][6];
@@ -271,15 +284,18 @@ inline void SolveSystems(const NormalSums& sums, Systems* out) {
 // The endpoints of a fit rounded to the codes of every mode, a mode a lane.
 struct RoundedModes {
   alignas(64) float code[4][3][16];
-  alignas(64) float estimate[16];  // the fit's error plus what the rounding costs at these index weights
+  alignas(64) float estimate[16];  // the fit's error plus what the rounding costs at these index
+                                   // weights
 };
 
-// Successive rounding (Babai's nearest plane): each unknown takes the code nearest to its optimum given those already
-// taken, within the reach of the deltas. Endpoint 0 goes first because the reach starts there.
+// Successive rounding (Babai's nearest plane): each unknown takes the code nearest to its optimum
+// given those already taken, within the reach of the deltas. Endpoint 0 goes first because the
+// reach starts there.
 template <int kRegions>
-inline void RoundToModes(const Systems& systems, int f, const ModeLanes& lanes, const float centre[3],
-                         RoundedModes* out) {
-  const F16 step = Load(lanes.step), inverse_step = Load(lanes.inverse_step), offset = Load(lanes.offset);
+inline void RoundToModes(const Systems& systems, int f, const ModeLanes& lanes,
+                         const float centre[3], RoundedModes* out) {
+  const F16 step = Load(lanes.step), inverse_step = Load(lanes.inverse_step),
+            offset = Load(lanes.offset);
   const F16 max_code = Load(lanes.max_code);
   F16 cost = Set(systems.error[2 * f]) + Set(kRegions == 2 ? systems.error[2 * f + 1] : 0.0f);
   F16 base[3];
@@ -303,9 +319,12 @@ inline void RoundToModes(const Systems& systems, int f, const ModeLanes& lanes, 
         const float* second = systems.solution[c] + 2 * f;
         const float* first = systems.solution[3 + c] + 2 * f;
         const int last = kRegions - 1;
-        const float least = std::min(std::min(first[0], second[0]), std::min(first[last], second[last]));
-        const float most = std::max(std::max(first[0], second[0]), std::max(first[last], second[last]));
-        const F16 from = MulAdd(Set(most + centre[c]), inverse_step, Set(1.0f) - half_range - offset);
+        const float least =
+            std::min(std::min(first[0], second[0]), std::min(first[last], second[last]));
+        const float most =
+            std::max(std::max(first[0], second[0]), std::max(first[last], second[last]));
+        const F16 from =
+            MulAdd(Set(most + centre[c]), inverse_step, Set(1.0f) - half_range - offset);
         const F16 to = MulAdd(Set(least + centre[c]), inverse_step, half_range - offset);
         code = Min(Max(code, Min(from, to)), Max(from, to));
       } else {
@@ -324,11 +343,12 @@ inline void RoundToModes(const Systems& systems, int f, const ModeLanes& lanes, 
   Store(out->estimate, cost);
 }
 
-// As RoundToModes for one mode, but with sixteen variants a region: the four unknowns that are decided first, the
-// cheapest to miss, take the nearest code or the second nearest. Keeps the best variant. Returns its estimate.
+// As RoundToModes for one mode, but with sixteen variants a region: the four unknowns that are
+// decided first, the cheapest to miss, take the nearest code or the second nearest. Keeps the best
+// variant. Returns its estimate.
 template <int kRegions>
-inline float RoundVariants(const Systems& systems, int f, const ModeLimits& mode, const float centre[3],
-                           float code_out[4][3]) {
+inline float RoundVariants(const Systems& systems, int f, const ModeLimits& mode,
+                           const float centre[3], float code_out[4][3]) {
   const float step = mode.step, inverse_step = mode.inverse_step;
   F16 base[3];
   float total = 0;
@@ -353,8 +373,10 @@ inline float RoundVariants(const Systems& systems, int f, const ModeLimits& mode
           const float* second = systems.solution[c] + 2 * f;
           const float* first = systems.solution[3 + c] + 2 * f;
           const int last = kRegions - 1;
-          const float least = std::min(std::min(first[0], second[0]), std::min(first[last], second[last]));
-          const float most = std::max(std::max(first[0], second[0]), std::max(first[last], second[last]));
+          const float least =
+              std::min(std::min(first[0], second[0]), std::min(first[last], second[last]));
+          const float most =
+              std::max(std::max(first[0], second[0]), std::max(first[last], second[last]));
           const float from = (most + centre[c]) * inverse_step + 1.0f - half_range - mode.offset;
           const float to = (least + centre[c]) * inverse_step + half_range - mode.offset;
           code = Min(Max(code, Set(std::min(from, to))), Set(std::max(from, to)));

@@ -1,10 +1,11 @@
-// The exact part: what a decoder makes of endpoint codes, the best index of every texel, and the search over codes.
-// Compiled for each target.
+// The exact part: what a decoder makes of endpoint codes, the best index of every texel, and the
+// search over codes. Compiled for each target.
 
 namespace patina::PATINA_SIMD {
 namespace {
 
-// Legal endpoint codes with a partition; endpoint 0 is the base of the deltas. Codes are whole numbers in floats.
+// Legal endpoint codes with a partition; endpoint 0 is the base of the deltas. Codes are whole
+// numbers in floats.
 struct Codes {
   int mode = 0;
   int partition = 0;
@@ -12,19 +13,21 @@ struct Codes {
   float code[4][3] = {};
   float error[2] = {};  // of each region, with the best indices
   int channel = 0;      // the next one to step
-  int idle = 0;         // channels stepped without gain since the last gain; 3: nothing left to gain
+  int idle = 0;  // channels stepped without gain since the last gain; 3: nothing left to gain
 
   float Total() const { return error[0] + error[1]; }
 };
 
-// Codes to the decoder's interpolation scale, over 64: exact, as the results are whole numbers of at most 16 bits.
+// Codes to the decoder's interpolation scale, over 64: exact, as the results are whole numbers of
+// at most 16 bits.
 PATINA_INLINE F16 Unquantized(const ModeLimits& mode, F16 code) {
   const F16 inner = (code + Set(mode.offset)) * Set(mode.wide_step);
   const F16 above = Select(code > Set(mode.max_code - 0.5f), Set(65535.0f / 64), inner);
   return Select(code < Set(0.5f), Zero(), above);
 }
 
-// Whether endpoints 0..kEndpoints-1 are in reach of endpoint `base` by `slack` codes more than needed, in channel c.
+// Whether endpoints 0..kEndpoints-1 are in reach of endpoint `base` by `slack` codes more than
+// needed, in channel c.
 template <int kEndpoints>
 PATINA_INLINE bool InReach(const ModeLimits& mode, const Codes& s, int c, int base, float slack) {
   float low = std::min(s.code[0][c], s.code[1][c]), high = std::max(s.code[0][c], s.code[1][c]);
@@ -40,23 +43,27 @@ PATINA_INLINE bool InReach(const ModeLimits& mode, const Codes& s, int c, int ba
 template <int kEntries>
 PATINA_INLINE bool Holds(const ModeLimits& mode, const Codes& s) {
   constexpr int kEndpoints = kEntries == 8 ? 4 : 2;
-  return !mode.transformed || (InReach<kEndpoints>(mode, s, 0, 0, 0) && InReach<kEndpoints>(mode, s, 1, 0, 0) &&
-                               InReach<kEndpoints>(mode, s, 2, 0, 0));
+  return !mode.transformed ||
+         (InReach<kEndpoints>(mode, s, 0, 0, 0) && InReach<kEndpoints>(mode, s, 1, 0, 0) &&
+          InReach<kEndpoints>(mode, s, 2, 0, 0));
 }
 
-// Whether the index of texel 0 must stay in the lower half: true unless the mode can hold region 0 turned round, also
-// after both endpoints moved by `stride` codes in channel `moving`.
+// Whether the index of texel 0 must stay in the lower half: true unless the mode can hold region 0
+// turned round, also after both endpoints moved by `stride` codes in channel `moving`.
 template <int kEntries>
-PATINA_INLINE bool AnchorIsBound(const ModeLimits& mode, const Codes& s, int moving = -1, float stride = 0) {
+PATINA_INLINE bool AnchorIsBound(const ModeLimits& mode, const Codes& s, int moving = -1,
+                                 float stride = 0) {
   constexpr int kEndpoints = kEntries == 8 ? 4 : 2;
   if (!mode.transformed) return false;
   bool free = true;
-  for (int c = 0; c < 3; ++c) free &= InReach<kEndpoints>(mode, s, c, 1, c == moving ? 2 * stride : 0.0f);
+  for (int c = 0; c < 3; ++c)
+    free &= InReach<kEndpoints>(mode, s, c, 1, c == moving ? 2 * stride : 0.0f);
   return !free;
 }
 
-// The palette entries of one channel: those of region 0 in lanes 0..7 and of region 1 in lanes 8..15, or sixteen.
-// `sum` is (a*(64-w) + b*w + 32) / 64 of unquantised a and b, exact in single precision.
+// The palette entries of one channel: those of region 0 in lanes 0..7 and of region 1 in
+// lanes 8..15, or sixteen. `sum` is (a*(64-w) + b*w + 32) / 64 of unquantised a and b, exact in
+// single precision.
 PATINA_INLINE F16 PaletteOfSums(F16 sum) {
   const I16 value = TruncateToInt(sum);
   return HalfBitsToFloat(ShiftRight<6>(ShiftLeft<5>(value) - value));
@@ -69,7 +76,8 @@ PATINA_INLINE F16 Sides(float region0, float region1) {
 }
 
 template <int kEntries>
-PATINA_INLINE F16 Palette(const BlockTables& tables, const ModeLimits& mode, const Codes& s, int c) {
+PATINA_INLINE F16 Palette(const BlockTables& tables, const ModeLimits& mode, const Codes& s,
+                          int c) {
   const F16 weight = Load(tables.weight[kEntries == 16]);
   const F16 a = Unquantized(mode, Sides<kEntries>(s.code[0][c], s.code[2][c]));
   const F16 b = Unquantized(mode, Sides<kEntries>(s.code[1][c], s.code[3][c]));
@@ -95,14 +103,16 @@ inline constexpr float kForbidden = 1e30f;
 // Gains below this share of the error are taken for rounding.
 inline constexpr float kLeastGain = 1e-5f;
 
-// Chooses every texel's index, the lowest of equals, and sets s->error. Returns the indices as palette lanes.
+// Chooses every texel's index, the lowest of equals, and sets s->error. Returns the indices as
+// palette lanes.
 template <int kEntries>
 inline I16 SearchIndices(const Problem& p, const BlockTables& tables, Codes* s) {
   const ModeLimits& mode = tables.mode[s->mode];
   F16 palette[3];
   for (int c = 0; c < 3; ++c) palette[c] = Palette<kEntries>(tables, mode, *s, c);
   const I16 first = FirstEntry<kEntries>(s->mask);
-  const F16 forbidden = AnchorIsBound<kEntries>(mode, *s) ? ZeroUnless(MaskOf(1u), Set(kForbidden)) : Zero();
+  const F16 forbidden =
+      AnchorIsBound<kEntries>(mode, *s) ? ZeroUnless(MaskOf(1u), Set(kForbidden)) : Zero();
   F16 best = Set(3e38f);
   I16 index = first;
   Unroll<kEntries>([&](auto k) PATINA_LAMBDA {
@@ -131,16 +141,20 @@ inline float ExactError(const Problem& p, const BlockTables& tables, const Codes
 }
 
 // The eight neighbours of a pair of codes.
-inline constexpr int kNeighbours[8][2] = {{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}, {0, 1}, {1, -1}, {1, 0}, {1, 1}};
+inline constexpr int kNeighbours[8][2] = {{-1, -1}, {-1, 0}, {-1, 1}, {0, -1},
+                                          {0, 1},   {1, -1}, {1, 0},  {1, 1}};
 
-// Sets of neighbours by the step of the first code, of the second, and by the difference of the two.
+// Sets of neighbours by the step of the first code, of the second, and by the difference of the
+// two.
 inline constexpr unsigned kFirstStep[3] = {0x07, 0x18, 0xE0};
 inline constexpr unsigned kSecondStep[3] = {0x29, 0x42, 0x94};
 inline constexpr unsigned kDifference[5] = {0x20, 0x48, 0x81, 0x12, 0x04};
 
-// Bit n is set where neighbour n of (code[2r][c], code[2r+1][c]) is legal while the other region stays.
+// Bit n is set where neighbour n of (code[2r][c], code[2r+1][c]) is legal while the other region
+// stays.
 template <int kEntries>
-PATINA_INLINE unsigned LegalNeighbours(const ModeLimits& mode, const Codes& s, int c, int r, float stride) {
+PATINA_INLINE unsigned LegalNeighbours(const ModeLimits& mode, const Codes& s, int c, int r,
+                                       float stride) {
   const float a = s.code[2 * r][c], b = s.code[2 * r + 1][c];
   float a_low = 0, a_high = mode.max_code, b_low = 0, b_high = mode.max_code;
   unsigned legal = 0xFF;
@@ -167,8 +181,8 @@ PATINA_INLINE unsigned LegalNeighbours(const ModeLimits& mode, const Codes& s, i
   return legal;
 }
 
-// Tries all steps of at most one code of both endpoints in the next channel, for both regions at once and with new
-// indices for each, and takes the best.
+// Tries all steps of at most one code of both endpoints in the next channel, for both regions at
+// once and with new indices for each, and takes the best.
 template <int kEntries>
 inline void StepChannel(const Problem& p, const BlockTables& tables, float stride, Codes* s) {
   constexpr int kRegions = kEntries == 8 ? 2 : 1;
@@ -178,19 +192,22 @@ inline void StepChannel(const Problem& p, const BlockTables& tables, float strid
   const int c1 = c == 0 ? 1 : 0, c2 = c == 2 ? 1 : 2;
   const F16 two = Set(2.0f);
 
-  // Per texel and entry, the error is (root P - centre)^2 + rest, where only P, the channel's entry, changes. P is taken
-  // relative to the block's mean target, for the sake of rounding.
+  // Per texel and entry, the error is (root P - centre)^2 + rest, where only P, the channel's
+  // entry, changes. P is taken relative to the block's mean target, for the sake of rounding.
   const I16 first = FirstEntry<kEntries>(s->mask);
   const F16 target = p.target[c] - Set(p.mean_target[c]);
   const F16 root = p.root[c], inverse_root = p.inverse_root[c];
   alignas(64) float centre[kEntries][16], rest[kEntries][16];
   {
-    const F16 with1 = p.hessian[kSymmetric[c][c1]] * inverse_root, with2 = p.hessian[kSymmetric[c][c2]] * inverse_root;
+    const F16 with1 = p.hessian[kSymmetric[c][c1]] * inverse_root,
+              with2 = p.hessian[kSymmetric[c][c2]] * inverse_root;
     const F16 h11 = p.hessian[kSymmetric[c1][c1]], h12 = two * p.hessian[kSymmetric[c1][c2]];
     const F16 h22 = p.hessian[kSymmetric[c2][c2]];
-    const F16 forbidden =
-        AnchorIsBound<kEntries>(mode, *s, c, stride) ? ZeroUnless(MaskOf(1u), Set(kForbidden)) : Zero();
-    const F16 palette1 = Palette<kEntries>(tables, mode, *s, c1), palette2 = Palette<kEntries>(tables, mode, *s, c2);
+    const F16 forbidden = AnchorIsBound<kEntries>(mode, *s, c, stride)
+                              ? ZeroUnless(MaskOf(1u), Set(kForbidden))
+                              : Zero();
+    const F16 palette1 = Palette<kEntries>(tables, mode, *s, c1),
+              palette2 = Palette<kEntries>(tables, mode, *s, c2);
     const F16 target1 = p.target[c1], target2 = p.target[c2], target_root = target * root;
     Unroll<kEntries>([&](auto k) PATINA_LAMBDA {
       const I16 lane = first + SetI(k);
@@ -216,7 +233,8 @@ inline void StepChannel(const Problem& p, const BlockTables& tables, float strid
   const F16 mean_target = Set(p.mean_target[c]);
   F16 sums[16];
   Unroll<8>([&](auto n) PATINA_LAMBDA {
-    const F16 palette = PaletteOfSums(a[kNeighbours[n][0] + 1] + b[kNeighbours[n][1] + 1]) - mean_target;
+    const F16 palette =
+        PaletteOfSums(a[kNeighbours[n][0] + 1] + b[kNeighbours[n][1] + 1]) - mean_target;
     F16 best = Set(3e38f);
     Unroll<kEntries>([&](auto k) PATINA_LAMBDA {
       const F16 d = MulAdd(Lookup(palette, first + SetI(k)), root, Load(centre[k]));
@@ -226,7 +244,8 @@ inline void StepChannel(const Problem& p, const BlockTables& tables, float strid
     sums[8 + n] = ZeroUnless(in_one, best);
   });
   const F16 errors = ReduceSums(sums);
-  const F16 wanted = Select(MaskOf(0xFF00u), Set(s->error[1]), Set(s->error[0])) * Set(1 - kLeastGain);
+  const F16 wanted =
+      Select(MaskOf(0xFF00u), Set(s->error[1]), Set(s->error[0])) * Set(1 - kLeastGain);
   const unsigned better = Bits(errors < wanted);
   int chosen[2] = {-1, -1};
   float gain[2] = {};

@@ -1,10 +1,11 @@
-// Principal lines of the two regions of all 32 partitions at once, a partition a lane. Compiled for each target.
+// Principal lines of the two regions of all 32 partitions at once, a partition a lane. Compiled for
+// each target.
 
 namespace patina::PATINA_SIMD {
 namespace {
 
-// For each partition and region, the line through weighted points that leaves the least squared distance.
-// Entry 32 is the whole block as region 0.
+// For each partition and region, the line through weighted points that leaves the least squared
+// distance. Entry 32 is the whole block as region 0.
 inline constexpr int kWholeBlock = 32;
 
 struct PrincipalLines {
@@ -13,10 +14,10 @@ struct PrincipalLines {
   alignas(64) float direction[2][3][48];  // unit, or zero where all points coincide
 };
 
-// One region's line from its moments: m0 = sum w, m1 = sum w z, m2 = sum w z z^T. Returns the squared distance left, and
-// `share_along` of the variance along the line.
-PATINA_INLINE F16 LineOfMoments(F16 m0, const F16 m1[3], const F16 m2[6], float share_along, F16 mean[3],
-                                F16 direction[3]) {
+// One region's line from its moments: m0 = sum w, m1 = sum w z, m2 = sum w z z^T. Returns the
+// squared distance left, and `share_along` of the variance along the line.
+PATINA_INLINE F16 LineOfMoments(F16 m0, const F16 m1[3], const F16 m2[6], float share_along,
+                                F16 mean[3], F16 direction[3]) {
   const F16 tiny = Set(0x1p-100f);
   const F16 inverse = Set(1.0f) / Max(m0, tiny);
   for (int c = 0; c < 3; ++c) mean[c] = m1[c] * inverse;
@@ -40,7 +41,8 @@ PATINA_INLINE F16 LineOfMoments(F16 m0, const F16 m1[3], const F16 m2[6], float 
   }
   const M16 y_over_x = m[3] > m[0];
   const M16 z_over = m[5] > Max(m[0], m[3]);
-  F16 v[3] = {Select(z_over, m[2], Select(y_over_x, m[1], m[0])), Select(z_over, m[4], Select(y_over_x, m[3], m[1])),
+  F16 v[3] = {Select(z_over, m[2], Select(y_over_x, m[1], m[0])),
+              Select(z_over, m[4], Select(y_over_x, m[3], m[1])),
               Select(z_over, m[5], Select(y_over_x, m[4], m[2]))};
   const F16 length2 = Dot(v, v);
   const F16 unit = Set(1.0f) / Sqrt(Max(length2, tiny));
@@ -51,9 +53,10 @@ PATINA_INLINE F16 LineOfMoments(F16 m0, const F16 m1[3], const F16 m2[6], float 
   return Max(MulAdd(along, Set(share_along), trace - along), Zero());
 }
 
-// points: [axis][texel]; weight: [texel], not negative; share_along: how much variance along the lines counts.
-inline void FindPrincipalLines(const BlockTables& tables, const F16 points[3], F16 weight, float share_along,
-                               PrincipalLines* lines) {
+// points: [axis][texel]; weight: [texel], not negative; share_along: how much variance along the
+// lines counts.
+inline void FindPrincipalLines(const BlockTables& tables, const F16 points[3], F16 weight,
+                               float share_along, PrincipalLines* lines) {
   alignas(64) float value[10][16];
   F16 weighted[3];
   Store(value[0], weight);
@@ -75,7 +78,8 @@ inline void FindPrincipalLines(const BlockTables& tables, const F16 points[3], F
     for (int region = 0; region < 2; ++region) {
       const F16* moments = region == 0 ? zero : one;
       F16 mean[3], direction[3];
-      residual = residual + LineOfMoments(moments[0], moments + 1, moments + 4, share_along, mean, direction);
+      residual = residual +
+                 LineOfMoments(moments[0], moments + 1, moments + 4, share_along, mean, direction);
       for (int c = 0; c < 3; ++c) {
         Store(lines->mean[region][c] + 16 * half, mean[c]);
         Store(lines->direction[region][c] + 16 * half, direction[c]);
@@ -105,22 +109,26 @@ inline void FitTexelsKernel(const float texels[3][16], bc6::SoftBlock* block) no
   F16 along = Zero();
   for (int c = 0; c < 3; ++c) {
     const F16 mean = Select(in_one, Set(lines.mean[1][c][best]), Set(lines.mean[0][c][best]));
-    const F16 direction = Select(in_one, Set(lines.direction[1][c][best]), Set(lines.direction[0][c][best]));
+    const F16 direction =
+        Select(in_one, Set(lines.direction[1][c][best]), Set(lines.direction[0][c][best]));
     along = MulAdd(direction, points[c] - mean, along);
   }
   float ends[2][2];
   for (int region = 0; region < 2; ++region) {
-    const F16 own = ZeroUnless(region == 0 ? in_zero : in_one, along);  // zero is the mean: within the range
+    const F16 own =
+        ZeroUnless(region == 0 ? in_zero : in_one, along);  // zero is the mean: within the range
     ends[region][0] = -ReduceMax(Zero() - own);
     ends[region][1] = ReduceMax(own);
   }
   const F16 least = Select(in_one, Set(ends[1][0]), Set(ends[0][0]));
   const F16 greatest = Select(in_one, Set(ends[1][1]), Set(ends[0][1]));
-  StoreU(block->index, Min(Max((along - least) / Max(greatest - least, Set(0x1p-60f)), Zero()), Set(1.0f)));
+  StoreU(block->index,
+         Min(Max((along - least) / Max(greatest - least, Set(0x1p-60f)), Zero()), Set(1.0f)));
   block->partition = best;
   for (int e = 0; e < 4; ++e) {
     for (int c = 0; c < 3; ++c) {
-      const float at = lines.mean[e / 2][c][best] + ends[e / 2][e % 2] * lines.direction[e / 2][c][best];
+      const float at =
+          lines.mean[e / 2][c][best] + ends[e / 2][e % 2] * lines.direction[e / 2][c][best];
       block->endpoint[e][c] = std::clamp(centre[c] + at, 1.0f, 30.9f);
     }
   }

@@ -35,7 +35,8 @@ void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.profile, ParseProfile, &job->profile);
   Override(overrides.quality, ParseQuality, &job->quality);
   Override(overrides.recipe, ParseRecipe, &job->recipe);
-  if (overrides.address) job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
+  if (overrides.address)
+    job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
   Override(overrides.normal_convention, &job->normal_convention);
   Override(overrides.seed, &job->seed);
   Override(overrides.threads, &job->threads);
@@ -47,7 +48,8 @@ void Apply(const JobOverrides& overrides, Job* job) {
   if (overrides.no_toksvig) job->toksvig = false;
 }
 
-void PlanFolder(const std::string& folder, const BakeOptions& options, Verbosity verbosity, std::vector<Planned>* plan) {
+void PlanFolder(const std::string& folder, const BakeOptions& options, Verbosity verbosity,
+                std::vector<Planned>* plan) {
   auto found = FindAssets(folder, options.job.out.value_or(""));
   if (!found) {
     plan->push_back({AssetNameFromPath(folder), Fail(found.error())});
@@ -75,24 +77,26 @@ std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
   std::vector<Planned> plan;
   for (const std::string& input : options.inputs) {
     std::error_code ignored;
-    if (!options.map_list.empty()) {
-      auto maps = ReadMapListFile(options.map_list);
-      Job job;
-      job.asset = AssetNameFromPath(input);
-      job.folder = input;
-      job.maps_folder = FolderOfFile(options.map_list);
-      if (!maps) {
-        plan.push_back({job.asset, Fail(maps.error())});
-        continue;
-      }
-      job.maps = std::move(*maps);
-      plan.push_back({job.asset, std::move(job)});
-    } else if (std::filesystem::is_regular_file(input, ignored)) {
+    if (std::filesystem::is_regular_file(input, ignored)) {
       auto job = ReadJobFile(input);
       const std::string asset = job ? job->asset : AssetNameFromPath(input);
       plan.push_back({asset, std::move(job)});
+    } else if (!options.map_list.empty()) {
+      Job job;
+      job.asset = AssetNameFromPath(input);
+      job.folder = input;
+      plan.push_back({job.asset, std::move(job)});
     } else {
       PlanFolder(input, options, verbosity, &plan);
+    }
+  }
+  if (!options.map_list.empty()) {
+    auto maps = ReadMapListFile(options.map_list);
+    for (Planned& planned : plan) {
+      if (!maps) planned.job = Fail(maps.error());
+      if (!planned.job) continue;
+      planned.job->maps = *maps;
+      planned.job->maps_folder = FolderOfFile(options.map_list);
     }
   }
   std::set<std::string> taken;
@@ -100,10 +104,12 @@ std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
     if (!planned.job) continue;
     Apply(options.job, &*planned.job);
     if (planned.job->out.empty()) {
-      planned.job = Fail(ErrorCode::kInvalidArgument, "no folder for the container; give --out DIR");
+      planned.job =
+          Fail(ErrorCode::kInvalidArgument, "no folder for the container; give --out DIR");
     } else if (!taken.insert(planned.job->out + "\n" + planned.asset).second) {
-      planned.job = Fail(ErrorCode::kConflict, "another input of this run is also named " + planned.asset +
-                                                   "; rename its folder, or bake it into another --out");
+      planned.job =
+          Fail(ErrorCode::kConflict, "another input of this run is also named " + planned.asset +
+                                         "; rename its folder, or bake it into another --out");
     }
   }
   return plan;
@@ -120,7 +126,8 @@ JobResult Unplanned(const std::string& asset, const Error& error) {
 
 // Later in the list is worse.
 int Severity(int exit_code) {
-  constexpr int kOrder[] = {kExitDone, kExitQualityGate, kExitBadInput, kExitUsage, kExitFailed, kExitInterrupted};
+  constexpr int kOrder[] = {kExitDone,  kExitQualityGate, kExitBadInput,
+                            kExitUsage, kExitFailed,      kExitInterrupted};
   for (int i = 0; i < 6; ++i) {
     if (kOrder[i] == exit_code) return i;
   }
@@ -132,6 +139,15 @@ void Print(const JobResult& result, const CommandLine& line) {
   if (line.verbosity == Verbosity::kQuiet) return;
   std::fputs(ResultText(result).c_str(), line.json ? stderr : stdout);
   std::fflush(stdout);
+}
+
+// Beside the events, unless they go to a pipe or a device; else beside the job.
+std::string DefaultResultPath(const RunOptions& options) {
+  std::error_code ignored;
+  const bool beside_events =
+      !options.events.empty() && std::filesystem::is_regular_file(options.events, ignored);
+  const std::string folder = FolderOfFile(beside_events ? options.events : options.job_file);
+  return folder.empty() ? "result.json" : folder + "/result.json";
 }
 
 }  // namespace
@@ -160,18 +176,15 @@ int BakeCommand(const CommandLine& line, const CancelToken& cancel) {
     std::fputs(SummaryText(results, plan.size()).c_str(), line.json ? stderr : stdout);
   }
   if (line.json) {
-    std::printf("%s\n", (plan.size() == 1 ? JobResultToJson(results[0], -1) : ResultsToJson(results, worst)).c_str());
+    std::printf("%s\n",
+                (plan.size() == 1 ? JobResultToJson(results[0], -1) : ResultsToJson(results, worst))
+                    .c_str());
   }
   return worst;
 }
 
 int RunCommand(const CommandLine& line, const CancelToken& cancel) {
   const RunOptions& options = line.run;
-  const std::string& neighbour = options.events.empty() ? options.job_file : options.events;
-  const std::string folder = FolderOfFile(neighbour);
-  const std::string result_path =
-      !options.result.empty() ? options.result : folder.empty() ? "result.json" : folder + "/result.json";
-
   ObserverList observers;
   std::optional<EventLog> events;
   if (!options.events.empty()) {
@@ -181,7 +194,8 @@ int RunCommand(const CommandLine& line, const CancelToken& cancel) {
     observers.Add(&*events);
   }
   auto job = ReadJobFile(options.job_file);
-  TerminalProgress terminal(stderr, line.verbosity, job ? job->asset : AssetNameFromPath(options.job_file));
+  TerminalProgress terminal(stderr, line.verbosity,
+                            job ? job->asset : AssetNameFromPath(options.job_file));
   observers.Add(&terminal);
   JobResult result;
   if (job) {
@@ -195,12 +209,17 @@ int RunCommand(const CommandLine& line, const CancelToken& cancel) {
   } else {
     Print(result, line);
   }
-  if (events && events->failed()) PrintError("some events could not be written to " + options.events);
-  const Status written = WriteFileDurably(result_path, std::string_view(JobResultToJson(result, 2) + "\n"));
+  const std::string result_path =
+      options.result.empty() ? DefaultResultPath(options) : options.result;
+  if (events && events->failed())
+    PrintError("some events could not be written to " + options.events);
+  const Status written =
+      WriteFileDurably(result_path, std::string_view(JobResultToJson(result, 2) + "\n"));
   if (line.json) std::printf("%s\n", JobResultToJson(result, -1).c_str());
   if (!written) {
     PrintError(written.error().message);
-    // The container, if any, is published; but who relies on the result file must not take it for done.
+    // The container, if any, is published; but who relies on the result file must not take it for
+    // done.
     return result.exit_code == kExitDone ? static_cast<int>(kExitFailed) : result.exit_code;
   }
   return result.exit_code;

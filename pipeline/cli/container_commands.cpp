@@ -1,8 +1,8 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "pipeline/cli/commands.h"
 #include "formats/container.h"
+#include "pipeline/cli/commands.h"
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/compare.h"
 #include "pipeline/jobs/describe.h"
@@ -13,7 +13,9 @@
 
 namespace patina {
 
-void PrintError(const std::string& message) { std::fprintf(stderr, "patina: error: %s\n", message.c_str()); }
+void PrintError(const std::string& message) {
+  std::fprintf(stderr, "patina: error: %s\n", message.c_str());
+}
 
 int FailCommand(const Error& error) {
   PrintError(error.message);
@@ -25,9 +27,11 @@ int UnpackCommand(const CommandLine& line, const CancelToken& cancel) {
   ThreadPool pool(line.threads);
   SetImageIoThreads(pool.threads());
   auto unpacked = UnpackContainer(options.container, options.out, options.mip,
-                                  options.format == "exr" ? UnpackFormat::kExr : UnpackFormat::kPng, pool, cancel);
+                                  options.format == "exr" ? UnpackFormat::kExr : UnpackFormat::kPng,
+                                  pool, cancel);
   if (!unpacked) return FailCommand(unpacked.error());
-  for (const std::string& warning : unpacked->warnings) std::fprintf(stderr, "patina: warning: %s\n", warning.c_str());
+  for (const std::string& warning : unpacked->warnings)
+    std::fprintf(stderr, "patina: warning: %s\n", warning.c_str());
   if (line.verbosity != Verbosity::kQuiet) {
     for (const std::string& path : unpacked->paths) std::printf("%s\n", path.c_str());
   }

@@ -17,7 +17,8 @@ extern "C" void OnSignal(int) { g_cancel.Cancel(); }
 void HandleSignals() {
   struct sigaction action {};
   action.sa_handler = OnSignal;
-  // The second signal ends the process at once; what is staged is then removed by the next bake of the asset.
+  // The second signal ends the process at once; what is staged is then removed by the next bake of
+  // the asset.
   action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);

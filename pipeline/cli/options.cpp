@@ -19,15 +19,20 @@ constexpr const char* kExamples =
     "  patina bake wall --out baked --profile bcf-2k --min-psnr 30\n"
     "  patina info baked/sample                         what a container holds and how good it is\n"
     "  patina unpack baked/sample --out maps            the maps back as images\n"
-    "  patina compare baked/sample sample               measure a container against its source again\n"
+    "  patina compare baked/sample sample               measure a container against its source "
+    "again\n"
     "\n"
-    "`patina COMMAND --help` explains a command. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input,\n"
+    "`patina COMMAND --help` explains a command. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 "
+    "bad input,\n"
     "4 below the quality gate, 130 interrupted.";
 
 constexpr const char* kBakeFooter =
-    "INPUT is a folder of maps (found by their file names), a folder of such folders, or a job file (see\n"
-    "schemas/job.schema.json), whose fields the options replace. One asset that fails does not stop the others; the exit\n"
-    "code is that of the worst. The result is OUT/<asset>/<revision>/ with OUT/<asset>/current pointing at it.\n"
+    "INPUT is a folder of maps (found by their file names), a folder of such folders, or a job "
+    "file (see\n"
+    "schemas/job.schema.json), whose fields the options replace. One asset that fails does not "
+    "stop the others; the exit\n"
+    "code is that of the worst. The result is OUT/<asset>/<revision>/ with OUT/<asset>/current "
+    "pointing at it.\n"
     "\n"
     "Examples:\n"
     "  patina bake sample --out baked\n"
@@ -35,15 +40,20 @@ constexpr const char* kBakeFooter =
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
     "  patina bake wall --out baked --target-psnr 34 --time-budget 60 --min-psnr 30\n"
     "\n"
-    "A map list (--maps) is a JSON array such as\n"
+    "A map list (--maps) is a JSON array with files relative to its own folder, such as\n"
     "  [{\"role\": \"albedo\", \"file\": \"wall_c.png\"},\n"
-    "   {\"role\": \"roughness\", \"file\": \"wall_gloss.png\", \"channels\": \"r\", \"invert\": true}]";
+    "   {\"role\": \"roughness\", \"file\": \"wall_gloss.png\", \"channels\": \"r\", \"invert\": "
+    "true}]";
 
 void AddCommon(CLI::App* command, CommandLine* line, bool with_json) {
-  if (with_json) command->add_flag("--json", line->json, "Print the result as JSON, the last line of standard output");
-  command->add_flag_callback("-q,--quiet", [line] { line->verbosity = Verbosity::kQuiet; }, "No progress, warnings only");
-  command->add_flag_callback("-v,--verbose", [line] { line->verbosity = Verbosity::kVerbose; },
-                             "Also what was found and how long each stage took");
+  if (with_json)
+    command->add_flag("--json", line->json,
+                      "Print the result as JSON, the last line of standard output");
+  command->add_flag_callback(
+      "-q,--quiet", [line] { line->verbosity = Verbosity::kQuiet; }, "No progress, warnings only");
+  command->add_flag_callback(
+      "-v,--verbose", [line] { line->verbosity = Verbosity::kVerbose; },
+      "Also what was found and how long each stage took");
   command
       ->add_option("--simd", line->simd,
                    "Instruction set of the kernels; does not change the result")
@@ -51,67 +61,89 @@ void AddCommon(CLI::App* command, CommandLine* line, bool with_json) {
 }
 
 template <class T>
-CLI::Option* AddOverride(CLI::App* command, const std::string& name, std::optional<T>* value, const std::string& help) {
-  return command->add_option_function<T>(name, [value](const T& given) { *value = given; }, help)->take_last();
+CLI::Option* AddOverride(CLI::App* command, const std::string& name, std::optional<T>* value,
+                         const std::string& help) {
+  return command
+      ->add_option_function<T>(
+          name, [value](const T& given) { *value = given; }, help)
+      ->take_last();
 }
 
 void AddBake(CLI::App* app, CommandLine* line) {
   CLI::App* command = app->add_subcommand("bake", "Bake PBR texture sets into containers");
   BakeOptions& o = line->bake;
-  command->add_option("INPUT", o.inputs, "Folders of maps, folders of such folders, job files")->required();
-  AddOverride(command, "-o,--out", &o.job.out, "Folder for the containers (needed unless every INPUT is a job file)")
+  command->add_option("INPUT", o.inputs, "Folders of maps, folders of such folders, job files")
+      ->required();
+  AddOverride(command, "-o,--out", &o.job.out,
+              "Folder for the containers (needed unless every INPUT is a job file)")
       ->type_name("DIR");
   AddOverride(command, "--profile", &o.job.profile,
               "Size of the feature textures: 1/4, 1/2 (default) or 1 x the side of the source")
       ->check(CLI::IsMember({"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}));
   AddOverride(command, "--quality", &o.job.quality, "How long to train (default standard)")
       ->check(CLI::IsMember({"preview", "standard", "reference"}));
-  AddOverride(command, "--target-psnr", &o.job.target_psnr_db, "Stop once the PSNR of mip 0 is there, in dB")
+  AddOverride(command, "--target-psnr", &o.job.target_psnr_db,
+              "Stop once the PSNR of mip 0 is there, in dB")
       ->check(CLI::Range(0.0, 100.0))
       ->type_name("DB");
-  AddOverride(command, "--time-budget", &o.job.time_budget_s,
-              "Aim to be done within so many seconds; the result then depends on the machine's speed")
+  AddOverride(
+      command, "--time-budget", &o.job.time_budget_s,
+      "Aim to be done within so many seconds; the result then depends on the machine's speed")
       ->check(CLI::Range(0.0, 1e6))
       ->type_name("S");
   AddOverride(command, "--min-psnr", &o.job.min_psnr_db,
               "Quality gate: publish nothing below this overall PSNR, in dB, and exit with 4")
       ->check(CLI::Range(0.0, 100.0))
       ->type_name("DB");
-  AddOverride(command, "--recipe", &o.job.recipe, "How to train: ours (default), or as Weinreich 2024 does")
+  AddOverride(command, "--recipe", &o.job.recipe,
+              "How to train: ours (default), or as Weinreich 2024 does")
       ->check(CLI::IsMember({"patina", "paper"}));
-  AddOverride(command, "--samples", &o.job.samples, "Train with exactly so many samples, in place of --quality's choice")
+  AddOverride(command, "--samples", &o.job.samples,
+              "Train with exactly so many samples, in place of --quality's choice")
       ->check(CLI::Range(0.0, 1e12))
       ->type_name("N");
   AddOverride(command, "--seed", &o.job.seed, "Seed of every random choice (default 1)")
       ->check(CLI::Range(uint64_t{0}, kMaxSeed))
       ->type_name("N");
-  AddOverride(command, "--threads", &o.job.threads, "Threads (default: all CPUs); does not change the result")
+  AddOverride(command, "--threads", &o.job.threads,
+              "Threads (default: all CPUs); does not change the result")
       ->check(CLI::Range(0, kMaxThreads))
       ->type_name("N");
-  command->add_option("--maps", o.map_list, "List of the maps of the one INPUT folder, in place of finding them by name")
+  command
+      ->add_option("--maps", o.map_list,
+                   "List of the maps of the one INPUT, in place of finding them by name")
       ->type_name("FILE.json");
   AddOverride(command, "--normal-convention", &o.job.normal_convention,
               "Y of normal maps: up (opengl) or down (directx); default by name and content")
       ->check(CLI::IsMember({"auto", "opengl", "directx"}));
-  AddOverride(command, "--address", &o.job.address, "What lies beyond the edge (default wrap, for tiling maps)")
+  AddOverride(command, "--address", &o.job.address,
+              "What lies beyond the edge (default wrap, for tiling maps)")
       ->check(CLI::IsMember({"wrap", "clamp"}));
-  command->add_flag("--repair-nonfinite", o.job.repair_nonfinite,
-                    "Replace NaN and infinite texels by their neighbours instead of refusing the file");
-  command->add_flag("--no-toksvig", o.job.no_toksvig,
-                    "Do not raise the roughness of coarser mips by the variance of the normals they average");
+  command->add_flag(
+      "--repair-nonfinite", o.job.repair_nonfinite,
+      "Replace NaN and infinite texels by their neighbours instead of refusing the file");
+  command->add_flag(
+      "--no-toksvig", o.job.no_toksvig,
+      "Do not raise the roughness of coarser mips by the variance of the normals they average");
   AddCommon(command, line, true);
   command->footer(kBakeFooter);
   command->callback([line] { line->command = Command::kBake; });
 }
 
 void AddRun(CLI::App* app, CommandLine* line) {
-  CLI::App* command = app->add_subcommand("run", "Run one job file, for daemons, scripts and farms");
-  command->add_option("JOB", line->run.job_file, "The job file (schemas/job.schema.json)")->required()->type_name("JOB.json");
-  command->add_option("--events", line->run.events, "Write progress events to this file, one JSON object a line")
+  CLI::App* command =
+      app->add_subcommand("run", "Run one job file, for daemons, scripts and farms");
+  command->add_option("JOB", line->run.job_file, "The job file (schemas/job.schema.json)")
+      ->required()
+      ->type_name("JOB.json");
+  command
+      ->add_option("--events", line->run.events,
+                   "Write progress events to this file, one JSON object a line")
       ->type_name("FILE");
   command
-      ->add_option("--result", line->run.result,
-                   "Where to write the result (default: result.json beside the events, or beside the job)")
+      ->add_option(
+          "--result", line->run.result,
+          "Where to write the result (default: result.json beside the events, or beside the job)")
       ->type_name("FILE");
   AddCommon(command, line, true);
   command->footer(
@@ -123,15 +155,24 @@ void AddRun(CLI::App* app, CommandLine* line) {
 void AddUnpack(CLI::App* app, CommandLine* line) {
   CLI::App* command = app->add_subcommand("unpack", "Write the maps of a container as images");
   UnpackOptions& o = line->unpack;
-  command->add_option("CONTAINER", o.container, "A container, or the folder of an asset (its current container)")->required();
+  command
+      ->add_option("CONTAINER", o.container,
+                   "A container, or the folder of an asset (its current container)")
+      ->required();
   command->add_option("-o,--out", o.out, "Folder for the images")->required()->type_name("DIR");
-  command->add_option("--mip", o.mip, "Mip level, 0 being the size of the source")->check(CLI::Range(0, 16))->type_name("N");
-  command->add_option("--format", o.format, "png (default; 8 or 16 bit as the source) or exr (floats, linear colour)")
+  command->add_option("--mip", o.mip, "Mip level, 0 being the size of the source")
+      ->check(CLI::Range(0, 16))
+      ->type_name("N");
+  command
+      ->add_option("--format", o.format,
+                   "png (default; 8 or 16 bit as the source) or exr (floats, linear colour)")
       ->check(CLI::IsMember({"png", "exr"}));
-  command->add_option("--threads", line->threads, "Threads (default: all CPUs)")->check(CLI::Range(0, kMaxThreads));
+  command->add_option("--threads", line->threads, "Threads (default: all CPUs)")
+      ->check(CLI::Range(0, kMaxThreads));
   AddCommon(command, line, false);
   command->footer(
-      "Files are named by role: albedo, normal (OpenGL), ao, roughness, metalness, displacement, emissive, opacity ...\n"
+      "Files are named by role: albedo, normal (OpenGL), ao, roughness, metalness, displacement, "
+      "emissive, opacity ...\n"
       "Example:\n"
       "  patina unpack baked/wall --out maps --format png");
   command->callback([line] { line->command = Command::kUnpack; });
@@ -139,7 +180,9 @@ void AddUnpack(CLI::App* app, CommandLine* line) {
 
 void AddInfo(CLI::App* app, CommandLine* line) {
   CLI::App* command = app->add_subcommand("info", "Say what a container holds and how good it is");
-  command->add_option("CONTAINER", line->info.container, "A container, or the folder of an asset (its current container)")
+  command
+      ->add_option("CONTAINER", line->info.container,
+                   "A container, or the folder of an asset (its current container)")
       ->required();
   AddCommon(command, line, true);
   command->footer("Example:\n  patina info baked/wall");
@@ -147,30 +190,45 @@ void AddInfo(CLI::App* app, CommandLine* line) {
 }
 
 void AddCompare(CLI::App* app, CommandLine* line) {
-  CLI::App* command = app->add_subcommand("compare", "Measure a container against source maps, from the files alone");
+  CLI::App* command = app->add_subcommand(
+      "compare", "Measure a container against source maps, from the files alone");
   CompareOptions& o = line->compare;
-  command->add_option("CONTAINER", o.container, "A container, or the folder of an asset (its current container)")->required();
+  command
+      ->add_option("CONTAINER", o.container,
+                   "A container, or the folder of an asset (its current container)")
+      ->required();
   command->add_option("SOURCE", o.source, "A folder of maps, or a job file")->required();
-  command->add_option("--maps", o.map_list, "List of the maps of SOURCE, in place of finding them by name")
+  command
+      ->add_option("--maps", o.map_list,
+                   "List of the maps of SOURCE, in place of finding them by name")
       ->type_name("FILE.json");
-  command->add_flag("--repair-nonfinite", o.repair_nonfinite, "Replace NaN and infinite texels of the source");
-  command->add_option("--threads", line->threads, "Threads (default: all CPUs)")->check(CLI::Range(0, kMaxThreads));
+  command->add_flag("--repair-nonfinite", o.repair_nonfinite,
+                    "Replace NaN and infinite texels of the source");
+  command->add_option("--threads", line->threads, "Threads (default: all CPUs)")
+      ->check(CLI::Range(0, kMaxThreads));
   AddCommon(command, line, true);
   command->footer("Example:\n  patina compare baked/wall textures/wall");
   command->callback([line] { line->command = Command::kCompare; });
 }
 
 void AddSample(CLI::App* app, CommandLine* line) {
-  CLI::App* command = app->add_subcommand("sample", "Make sample input: a procedural PBR texture set");
+  CLI::App* command =
+      app->add_subcommand("sample", "Make sample input: a procedural PBR texture set");
   SampleOptions& o = line->sample;
-  command->add_option("-o,--out", o.out, "Folder for the maps and their job.json")->required()->type_name("DIR");
-  command->add_option("--size", o.size, "Texels a side (default 1024)")->check(CLI::Range(1, kMaxSampleSide))->type_name("N");
+  command->add_option("-o,--out", o.out, "Folder for the maps and their job.json")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--size", o.size, "Texels a side (default 1024)")
+      ->check(CLI::Range(1, kMaxSampleSide))
+      ->type_name("N");
   command->add_option("--seed", o.seed, "Another seed makes another floor (default 1)")
       ->check(CLI::Range(uint64_t{0}, kMaxSeed))
       ->type_name("N");
-  command->add_option("--threads", line->threads, "Threads (default: all CPUs)")->check(CLI::Range(0, kMaxThreads));
+  command->add_option("--threads", line->threads, "Threads (default: all CPUs)")
+      ->check(CLI::Range(0, kMaxThreads));
   AddCommon(command, line, false);
-  command->footer("Example:\n  patina sample --out sample --size 512\n  patina run sample/job.json");
+  command->footer(
+      "Example:\n  patina sample --out sample --size 512\n  patina run sample/job.json");
   command->callback([line] { line->command = Command::kSample; });
 }
 
@@ -179,7 +237,9 @@ void AddSample(CLI::App* app, CommandLine* line) {
 ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   ParsedCommandLine parsed;
   CommandLine line;
-  CLI::App app("Patina bakes PBR texture sets into small neural materials that any engine can sample.", "patina");
+  CLI::App app(
+      "Patina bakes PBR texture sets into small neural materials that any engine can sample.",
+      "patina");
   app.set_version_flag("--version", std::string("patina ") + PATINA_VERSION, "Print the version");
   app.require_subcommand(1);
   app.footer(kExamples);
@@ -218,7 +278,8 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
       parsed.exit_code = kExitUsage;
       parsed.text = error.what();
       const std::vector<CLI::App*> used = app.get_subcommands();
-      parsed.text += used.empty() ? "; see `patina --help`" : "; see `patina " + used[0]->get_name() + " --help`";
+      parsed.text += used.empty() ? "; see `patina --help`"
+                                  : "; see `patina " + used[0]->get_name() + " --help`";
     }
   } catch (const CLI::OptionNotFound&) {
     parsed.exit_code = kExitUsage;

@@ -10,7 +10,8 @@
 
 namespace patina {
 
-// Every option of `bake` that can replace what a job file says. Absent: the job file's value, or the default.
+// Every option of `bake` that can replace what a job file says. Absent: the job file's value, or
+// the default.
 struct JobOverrides {
   std::optional<std::string> out;
   std::optional<std::string> profile;
@@ -77,7 +78,7 @@ struct CommandLine {
   bool json = false;
   Verbosity verbosity = Verbosity::kNormal;
   std::string simd;  // empty: what the environment says, or the best
-  int threads = 0;  // of commands other than bake and run
+  int threads = 0;   // of commands other than bake and run
 };
 
 // What came of parsing: a command to run, or text to print and a code to exit with.

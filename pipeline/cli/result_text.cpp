@@ -20,11 +20,12 @@ std::string FirstLine(const std::string& text) { return text.substr(0, text.find
 std::string ResultText(const JobResult& result) {
   std::string text = result.asset + ": ";
   if (result.psnr) {
-    text += Number(result.psnr->overall_db, 2) + " dB (mip 0 " + Number(result.psnr->mip0_db, 2) + ", mean of mips " +
-            Number(result.psnr->mean_mips_db, 2) + ")";
+    text += Number(result.psnr->overall_db, 2) + " dB (mip 0 " + Number(result.psnr->mip0_db, 2) +
+            ", mean of mips " + Number(result.psnr->mean_mips_db, 2) + ")";
     if (result.ssim) text += ", SSIM " + Number(*result.ssim, 3);
     if (result.flip) text += ", FLIP " + Number(*result.flip, 3);
-    if (result.normal_angle_deg) text += ", normals " + Number(*result.normal_angle_deg, 2) + " degrees";
+    if (result.normal_angle_deg)
+      text += ", normals " + Number(*result.normal_angle_deg, 2) + " degrees";
     text += "\n  ";
     for (const auto& [role, db] : result.psnr->maps) text += role + " " + Number(db, 2) + " dB, ";
     text += BytesText(static_cast<double>(result.bytes)) + ", ";
@@ -44,13 +45,15 @@ std::string SummaryText(std::span<const JobResult> results, size_t planned) {
     }
   }
   std::string text = std::to_string(done) + " of " + std::to_string(planned) + " assets baked";
-  if (results.size() < planned) text += ", " + std::to_string(planned - results.size()) + " not begun";
+  if (results.size() < planned)
+    text += ", " + std::to_string(planned - results.size()) + " not begun";
   return text + (others.empty() ? "\n" : "; not baked:\n" + others);
 }
 
 std::string ResultsToJson(std::span<const JobResult> results, int exit_code) {
   std::string json = "{\"version\":1,\"exit_code\":" + std::to_string(exit_code) + ",\"assets\":[";
-  for (size_t i = 0; i < results.size(); ++i) json += (i > 0 ? "," : "") + JobResultToJson(results[i], -1);
+  for (size_t i = 0; i < results.size(); ++i)
+    json += (i > 0 ? "," : "") + JobResultToJson(results[i], -1);
   return json + "]}";
 }
 

@@ -11,7 +11,8 @@ namespace patina {
 // Two lines on a job that is done: quality, size, time and place; then the PSNR of each map.
 std::string ResultText(const JobResult& result);
 
-// What became of several assets: a count, and a line for each that is not done. planned: how many there were to be.
+// What became of several assets: a count, and a line for each that is not done. planned: how many
+// there were to be.
 std::string SummaryText(std::span<const JobResult> results, size_t planned);
 
 // One line of JSON: {"version":1,"exit_code":...,"assets":[...]}.

@@ -15,7 +15,8 @@ template <class... Args>
 std::string Format(const char* format, Args... args) {
   char text[160];
   const int n = std::snprintf(text, sizeof text, format, args...);
-  return n > 0 ? std::string(text, std::min(static_cast<size_t>(n), sizeof text - 1)) : std::string();
+  return n > 0 ? std::string(text, std::min(static_cast<size_t>(n), sizeof text - 1))
+               : std::string();
 }
 
 int TerminalColumns(int fd) {
@@ -85,7 +86,9 @@ void TerminalProgress::OnProgress(const ProgressEvent& event) {
   live_ ? Draw(line) : Print(line);
 }
 
-void TerminalProgress::OnWarning(const std::string& message) { Print("patina: warning: " + asset_ + ": " + message); }
+void TerminalProgress::OnWarning(const std::string& message) {
+  Print("patina: warning: " + asset_ + ": " + message);
+}
 
 void TerminalProgress::OnStageStarted(const std::string& stage) {
   if (verbosity_ == Verbosity::kQuiet || !live_) return;
@@ -93,13 +96,15 @@ void TerminalProgress::OnStageStarted(const std::string& stage) {
 }
 
 void TerminalProgress::OnNote(const std::string& status, const std::string& message) {
-  if (verbosity_ == Verbosity::kVerbose || (verbosity_ == Verbosity::kNormal && status == "guessed")) {
+  if (verbosity_ == Verbosity::kVerbose ||
+      (verbosity_ == Verbosity::kNormal && status == "guessed")) {
     Print(asset_ + ": " + status + " " + message);
   }
 }
 
 void TerminalProgress::OnStageFinished(const std::string& stage, double seconds) {
-  if (verbosity_ == Verbosity::kVerbose) Print(asset_ + ": " + stage + " took " + DurationText(seconds));
+  if (verbosity_ == Verbosity::kVerbose)
+    Print(asset_ + ": " + stage + " took " + DurationText(seconds));
 }
 
 void TerminalProgress::OnResult(const JobResult&) {

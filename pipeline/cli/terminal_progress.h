@@ -11,7 +11,8 @@ namespace patina {
 
 enum class Verbosity { kQuiet, kNormal, kVerbose };
 
-// "cobblestone: train 63 %, 29.4 M samples/s, 31.2 dB, 11 s left". Numbers that are not known are left out.
+// "cobblestone: train 63 %, 29.4 M samples/s, 31.2 dB, 11 s left". Numbers that are not known are
+// left out.
 std::string ProgressLine(const std::string& asset, const ProgressEvent& event);
 
 // "11 s", "2 min 05 s", "1 h 02 min".
@@ -22,9 +23,9 @@ std::string BytesText(double bytes);
 
 class TerminalProgress : public JobObserver {
  public:
-  // out is not owned. On a terminal one line is redrawn at most ten times a second; elsewhere a line is written at most
-  // every two seconds. kQuiet shows warnings only, kNormal also what was guessed, kVerbose also what was found and
-  // ignored and the time of each stage.
+  // out is not owned. On a terminal one line is redrawn at most ten times a second; elsewhere a
+  // line is written at most every two seconds. kQuiet shows warnings only, kNormal also what was
+  // guessed, kVerbose also what was found and ignored and the time of each stage.
   TerminalProgress(std::FILE* out, Verbosity verbosity, std::string asset);
 
   void OnProgress(const ProgressEvent& event) override;

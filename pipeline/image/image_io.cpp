@@ -154,8 +154,8 @@ struct OpenImage {
   OIIO::TypeDesc read_type;
 };
 
-// What pixels of the wanted channels become; nullptr for a type that is not read.
-bool SampleTypeOf(OIIO::TypeDesc type, SampleType* sample_type) {
+// What samples of a library type become; false for a type that is not read.
+bool SampleTypeOf(const OIIO::TypeDesc& type, SampleType* sample_type) {
   switch (type.basetype) {
     case OIIO::TypeDesc::UINT8:
       *sample_type = SampleType::kUint8;
@@ -309,8 +309,8 @@ uint16_t ToUnorm16(float value) {
 }
 
 template <class T, class Convert>
-Status WriteRows(OIIO::ImageOutput* output, OIIO::TypeDesc type, int height, size_t row_values,
-                 const float* values, const std::string& path, Convert convert) {
+Status WriteRows(OIIO::ImageOutput* output, const OIIO::TypeDesc& type, int height,
+                 size_t row_values, const float* values, const std::string& path, Convert convert) {
   std::vector<T> row(row_values);
   for (int y = 0; y < height; ++y) {
     const float* from = values + static_cast<size_t>(y) * row_values;

@@ -550,8 +550,10 @@ Result<MapSet> ResolveMaps(const std::vector<MapRequest>& requests, const std::s
                                                                        : token->parts;
     } else {
       std::string roles;
-      for (const MapRole& known : MapRoles())
-        roles += std::string(roles.empty() ? "" : ", ") + known.name;
+      for (const MapRole& known : MapRoles()) {
+        if (!roles.empty()) roles += ", ";
+        roles += known.name;
+      }
       return Fail(ErrorCode::kInvalidArgument,
                   where + ": unknown role \"" + request.role + "\"; roles are " + roles +
                       ", and orm, arm, rma, metallicsmoothness, ... without channels");

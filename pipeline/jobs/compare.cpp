@@ -23,24 +23,27 @@ std::string Cell(const std::optional<double>& value, int digits) {
 
 }  // namespace
 
-Result<Comparison> CompareContainer(const std::string& container, const Job& source, ThreadPool& pool,
-                                    const CancelToken& cancel, ProgressSink& progress) {
+Result<Comparison> CompareContainer(const std::string& container, const Job& source,
+                                    ThreadPool& pool, const CancelToken& cancel,
+                                    ProgressSink& progress) {
   PATINA_ASSIGN(const Container opened, OpenContainer(container));
   PATINA_TRY(VerifyPayloads(opened));
   Job job = source;
-  job.address = opened.manifest.source.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
+  job.address =
+      opened.manifest.source.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
   PATINA_ASSIGN(const MapSet set, MapsOfJob(job));
   PATINA_ASSIGN(const JobSource read, ReadSource(job, set, pool, cancel, progress));
   Comparison comparison;
   comparison.asset = opened.manifest.asset;
   comparison.directory = opened.directory;
-  PATINA_ASSIGN(comparison.measurement, MeasureContainer(opened.directory, read.reference.material, pool, cancel,
-                                                         progress, nullptr));
+  PATINA_ASSIGN(comparison.measurement, MeasureContainer(opened.directory, read.reference.material,
+                                                         pool, cancel, progress, nullptr));
   const std::vector<ManifestSourceFile>& files = opened.manifest.source.files;
-  comparison.same_source = files.size() == read.sha256.size() &&
-                           std::all_of(files.begin(), files.end(), [&](const ManifestSourceFile& file) {
-                             return std::find(read.sha256.begin(), read.sha256.end(), file.sha256) != read.sha256.end();
-                           });
+  comparison.same_source =
+      files.size() == read.sha256.size() &&
+      std::all_of(files.begin(), files.end(), [&](const ManifestSourceFile& file) {
+        return std::find(read.sha256.begin(), read.sha256.end(), file.sha256) != read.sha256.end();
+      });
   return comparison;
 }
 
@@ -52,7 +55,8 @@ std::string ComparisonToJson(const Comparison& comparison) {
   Json json;
   json["asset"] = comparison.asset;
   json["container"] = comparison.directory;
-  json["psnr"] = {{"overall", psnr.overall_db}, {"mip0", psnr.mip0_db}, {"mean_mips", psnr.mean_mips_db}};
+  json["psnr"] = {
+      {"overall", psnr.overall_db}, {"mip0", psnr.mip0_db}, {"mean_mips", psnr.mean_mips_db}};
   json["psnr"]["maps"] = std::move(maps);
   json["ssim"] = OrNull(quality.ssim);
   json["flip"] = OrNull(quality.flip);
@@ -65,14 +69,18 @@ std::string ComparisonToJson(const Comparison& comparison) {
 std::string ComparisonText(const Comparison& comparison) {
   const metrics::QualityResult& quality = comparison.measurement.quality;
   std::string text = comparison.asset + "  (" + comparison.directory + ")\n";
-  text += "                     overall dB   mip 0 dB    mips dB       SSIM       FLIP    degrees\n";
-  auto row = [&](std::string name, const metrics::PsnrTable& psnr, const std::optional<double>& ssim,
-                 const std::optional<double>& flip, const std::optional<double>& angle) {
+  text +=
+      "                     overall dB   mip 0 dB    mips dB       SSIM       FLIP    degrees\n";
+  auto row = [&](std::string name, const metrics::PsnrTable& psnr,
+                 const std::optional<double>& ssim, const std::optional<double>& flip,
+                 const std::optional<double>& angle) {
     name.resize(20, ' ');
     text += name + Cell(CapPsnr(psnr.overall_db), 2) + " " + Cell(CapPsnr(psnr.mip0_db), 2) + " " +
-            Cell(CapPsnr(psnr.mean_mips_db), 2) + " " + Cell(ssim, 4) + " " + Cell(flip, 4) + " " + Cell(angle, 3) + "\n";
+            Cell(CapPsnr(psnr.mean_mips_db), 2) + " " + Cell(ssim, 4) + " " + Cell(flip, 4) + " " +
+            Cell(angle, 3) + "\n";
   };
-  for (const metrics::MapQuality& map : quality.maps) row(map.name, map.psnr, map.ssim, map.flip, map.normal_angle_deg);
+  for (const metrics::MapQuality& map : quality.maps)
+    row(map.name, map.psnr, map.ssim, map.flip, map.normal_angle_deg);
   row("all", quality.psnr, quality.ssim, quality.flip, quality.normal_angle_deg);
   text += comparison.same_source ? "The source is the one it was baked from.\n"
                                  : "The source's files are not those it was baked from.\n";

@@ -18,14 +18,15 @@ struct Comparison {
   bool same_source = false;  // the source's files have the hashes that the manifest lists
 };
 
-// `source` says where the maps are: folder, set or maps of a job; its other fields are not used but for repair_nonfinite,
-// toksvig and normal_convention. Addressing is the container's.
-// Errors: those of OpenContainer, VerifyPayloads, MapsOfJob, ReadSource and MeasureContainer.
-Result<Comparison> CompareContainer(const std::string& container, const Job& source, ThreadPool& pool,
-                                    const CancelToken& cancel, ProgressSink& progress);
+// `source` says where the maps are: folder, set or maps of a job; its other fields are not used but
+// for repair_nonfinite, toksvig and normal_convention. Addressing is the container's. Errors: those
+// of OpenContainer, VerifyPayloads, MapsOfJob, ReadSource and MeasureContainer.
+Result<Comparison> CompareContainer(const std::string& container, const Job& source,
+                                    ThreadPool& pool, const CancelToken& cancel,
+                                    ProgressSink& progress);
 
-// The measures on one line: asset, container, psnr {overall, mip0, mean_mips, maps}, ssim, flip, normal_angle_deg,
-// same_source, not_compared.
+// The measures on one line: asset, container, psnr {overall, mip0, mean_mips, maps}, ssim, flip,
+// normal_angle_deg, same_source, not_compared.
 std::string ComparisonToJson(const Comparison& comparison);
 // And as a table for a person.
 std::string ComparisonText(const Comparison& comparison);

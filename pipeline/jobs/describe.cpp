@@ -13,7 +13,8 @@ template <class... Args>
 std::string Format(const char* format, Args... args) {
   char text[512];
   const int n = std::snprintf(text, sizeof text, format, args...);
-  return n > 0 ? std::string(text, std::min(static_cast<size_t>(n), sizeof text - 1)) : std::string();
+  return n > 0 ? std::string(text, std::min(static_cast<size_t>(n), sizeof text - 1))
+               : std::string();
 }
 
 std::string Decibels(double db) { return std::isfinite(db) ? Format("%.2f dB", db) : "exact"; }
@@ -31,7 +32,8 @@ std::string MapLine(const Manifest& manifest, const ManifestMapQuality& quality)
     if (channel.output >= 0) {
       ++learned;
     } else {
-      constants += (constants.empty() ? "" : ", ") + Format("%.4g", static_cast<double>(channel.constant));
+      constants +=
+          (constants.empty() ? "" : ", ") + Format("%.4g", static_cast<double>(channel.constant));
     }
   }
   if (learned > 0) line += Format("   %d channel%s learned", learned, learned == 1 ? "" : "s");
@@ -44,57 +46,63 @@ std::string MapLine(const Manifest& manifest, const ManifestMapQuality& quality)
 std::string ContainerText(const Container& container) {
   const Manifest& m = container.manifest;
   std::string text = m.asset + "  (" + container.directory + ")\n";
-  text += Format("  %d x %d texels, %d mips, %s, profile %s, quality %s, recipe %s %d, seed %llu\n", m.source.width,
-                 m.source.height, m.source.levels, m.source.address.c_str(), m.profile.c_str(),
-                 m.quality_setting.c_str(), m.tool.recipe.c_str(), m.tool.recipe_version,
-                 static_cast<unsigned long long>(m.seed));
-  text += Format("  PSNR %s overall, %s mip 0, %s mean of mips", Decibels(m.quality.psnr_overall_db).c_str(),
-                 Decibels(m.quality.psnr_mip0_db).c_str(), Decibels(m.quality.psnr_mean_mips_db).c_str());
+  text += Format("  %d x %d texels, %d mips, %s, profile %s, quality %s, recipe %s %d, seed %llu\n",
+                 m.source.width, m.source.height, m.source.levels, m.source.address.c_str(),
+                 m.profile.c_str(), m.quality_setting.c_str(), m.tool.recipe.c_str(),
+                 m.tool.recipe_version, static_cast<unsigned long long>(m.seed));
+  text += Format(
+      "  PSNR %s overall, %s mip 0, %s mean of mips", Decibels(m.quality.psnr_overall_db).c_str(),
+      Decibels(m.quality.psnr_mip0_db).c_str(), Decibels(m.quality.psnr_mean_mips_db).c_str());
   if (m.quality.ssim) text += Format(", SSIM %.4f", *m.quality.ssim);
   if (m.quality.flip) text += Format(", FLIP %.4f", *m.quality.flip);
   text += "\n";
   if (m.quality.gate_min_psnr_db) {
-    text += Format("  quality gate %.2f dB: %s\n", *m.quality.gate_min_psnr_db, m.quality.gate_met ? "met" : "missed");
+    text += Format("  quality gate %.2f dB: %s\n", *m.quality.gate_min_psnr_db,
+                   m.quality.gate_met ? "met" : "missed");
   }
   text += "\nMaps\n";
   for (const ManifestMapQuality& map : m.quality.maps) text += MapLine(m, map);
   text += "\nFiles\n";
   for (const ManifestPayload& payload : m.payloads) {
-    text += Format("  %-18s%12llu bytes  %s", payload.name.c_str(), static_cast<unsigned long long>(payload.bytes),
-                   payload.role.c_str());
+    text += Format("  %-18s%12llu bytes  %s", payload.name.c_str(),
+                   static_cast<unsigned long long>(payload.bytes), payload.role.c_str());
     for (const ManifestFeature& feature : m.features) {
       if (feature.payload == payload.name) {
-        text += Format("  %d x %d, %d mips, sampled at s%+d", feature.width, feature.height, feature.levels,
-                       feature.lod_bias);
+        text += Format("  %d x %d, %d mips, sampled at s%+d", feature.width, feature.height,
+                       feature.levels, feature.lod_bias);
       }
     }
     text += "\n";
   }
   if (m.network) {
-    text += Format("  network %d -> %d -> %d, %s\n", m.network->inputs, m.network->hidden, m.network->outputs,
-                   m.network->activation.c_str());
+    text += Format("  network %d -> %d -> %d, %s\n", m.network->inputs, m.network->hidden,
+                   m.network->outputs, m.network->activation.c_str());
   }
-  text += Format("  %llu bytes for an engine to load\n", static_cast<unsigned long long>(ModelBytes(m.payloads)));
+  text += Format("  %llu bytes for an engine to load\n",
+                 static_cast<unsigned long long>(ModelBytes(m.payloads)));
   text += "\nSource\n";
   for (const ManifestSourceFile& file : m.source.files) {
     std::string roles;
     for (const std::string& role : file.roles) roles += (roles.empty() ? "" : ", ") + role;
-    text += Format("  %s  %d x %d x %d %s: ", file.path.c_str(), file.width, file.height, file.channels,
-                   file.type.c_str());
+    text += Format("  %s  %d x %d x %d %s: ", file.path.c_str(), file.width, file.height,
+                   file.channels, file.type.c_str());
     text += roles + "\n";
   }
-  text += Format("\nTraining: %.1f M samples, stopped by %s; patina %s\n", static_cast<double>(m.training.samples) / 1e6,
-                 m.training.stopped_by.c_str(), m.tool.version.c_str());
+  text += Format("\nTraining: %.1f M samples, stopped by %s; patina %s\n",
+                 static_cast<double>(m.training.samples) / 1e6, m.training.stopped_by.c_str(),
+                 m.tool.version.c_str());
   for (const std::string& warning : m.warnings) text += "Warning: " + warning + "\n";
   return text;
 }
 
 Result<std::string> ContainerJson(const Container& container) {
-  PATINA_ASSIGN(const std::string text, ReadTextFile(container.PathOf(kManifestName), kMaxManifestBytes));
+  PATINA_ASSIGN(const std::string text,
+                ReadTextFile(container.PathOf(kManifestName), kMaxManifestBytes));
   using Json = nlohmann::ordered_json;
   Json manifest = Json::parse(text, nullptr, false);
   if (manifest.is_discarded()) {
-    return Fail(ErrorCode::kCorruptData, container.PathOf(kManifestName) + ": not JSON; bake the asset again");
+    return Fail(ErrorCode::kCorruptData,
+                container.PathOf(kManifestName) + ": not JSON; bake the asset again");
   }
   Json json{{"container", container.directory}, {"bytes", ModelBytes(container.manifest.payloads)}};
   json["manifest"] = std::move(manifest);

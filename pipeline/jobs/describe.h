@@ -11,8 +11,8 @@ namespace patina {
 // What a container holds and how good it is, for a person: several lines.
 std::string ContainerText(const Container& container);
 
-// For machines, on one line: {"container": directory, "bytes": of features and weights, "manifest": {...}}, the manifest
-// as the file has it. Errors: kNotFound, kIo, kCorruptData.
+// For machines, on one line: {"container": directory, "bytes": of features and weights, "manifest":
+// {...}}, the manifest as the file has it. Errors: kNotFound, kIo, kCorruptData.
 Result<std::string> ContainerJson(const Container& container);
 
 }  // namespace patina

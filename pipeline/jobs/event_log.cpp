@@ -92,9 +92,13 @@ void EventLog::OnProgress(const ProgressEvent& event) {
   Write("progress", Members(json));
 }
 
-void EventLog::OnWarning(const std::string& message) { Write("warning", Members(Json{{"message", message}})); }
+void EventLog::OnWarning(const std::string& message) {
+  Write("warning", Members(Json{{"message", message}}));
+}
 
-void EventLog::OnStageStarted(const std::string& stage) { Write("stage_started", Members(Json{{"stage", stage}})); }
+void EventLog::OnStageStarted(const std::string& stage) {
+  Write("stage_started", Members(Json{{"stage", stage}}));
+}
 
 void EventLog::OnNote(const std::string& status, const std::string& message) {
   Write("note", Members(Json{{"status", status}, {"message", message}}));

@@ -1,4 +1,5 @@
-// What a running job tells: to a person, and to a file of events. Described by schemas/events.schema.json.
+// What a running job tells: to a person, and to a file of events. Described by
+// schemas/events.schema.json.
 #pragma once
 
 #include <chrono>
@@ -11,8 +12,8 @@
 
 namespace patina {
 
-// Told about everything in a job's life, on the thread that runs the job: for each stage a start, reports, notes, warnings
-// and, unless it fails, an end; at last the result.
+// Told about everything in a job's life, on the thread that runs the job: for each stage a start,
+// reports, notes, warnings and, unless it fails, an end; at last the result.
 class JobObserver : public ProgressSink {
  public:
   virtual void OnStageStarted(const std::string& stage) = 0;
@@ -38,9 +39,9 @@ class ObserverList : public JobObserver {
   std::vector<JobObserver*> observers_;
 };
 
-// Writes events to a file, one JSON object a line, each with a single write so that a reader never sees half a line that
-// will not be completed. Reports of progress are thinned to ten a second. A write that fails is not tried again and does
-// not disturb the job; see failed().
+// Writes events to a file, one JSON object a line, each with a single write so that a reader never
+// sees half a line that will not be completed. Reports of progress are thinned to ten a second. A
+// write that fails is not tried again and does not disturb the job; see failed().
 class EventLog : public JobObserver {
  public:
   // Creates or empties the file. Errors: kIo, kNotFound, kResourceExhausted.
@@ -62,7 +63,8 @@ class EventLog : public JobObserver {
  private:
   using Clock = std::chrono::steady_clock;
   explicit EventLog(int fd) : fd_(fd), start_(Clock::now()) {}
-  // fields: the members of the event after "type", as JSON text that starts with a comma, or nothing.
+  // fields: the members of the event after "type", as JSON text that starts with a comma, or
+  // nothing.
   void Write(const char* type, const std::string& fields);
 
   int fd_ = -1;

@@ -1,54 +1,67 @@
 #include "pipeline/jobs/ingest.h"
 
+#include <map>
+
 #include "formats/base/sha256.h"
 
 namespace patina {
 namespace {
 
-Result<std::vector<std::string>> HashFiles(const std::vector<std::string>& paths, const CancelToken& cancel) {
-  std::vector<std::string> hashes;
+// SHA-256 of each file by its path.
+Result<std::map<std::string, std::string>> HashFiles(const std::vector<std::string>& paths,
+                                                     const CancelToken& cancel) {
+  std::map<std::string, std::string> hashes;
   for (const std::string& path : paths) {
+    if (hashes.count(path) != 0) continue;
     if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
     PATINA_ASSIGN(FileDigest digest, Sha256OfFile(path));
-    hashes.push_back(std::move(digest.sha256));
+    hashes[path] = std::move(digest.sha256);
   }
   return hashes;
 }
 
 }  // namespace
 
-Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool, const CancelToken& cancel,
-                             ProgressSink& progress) {
+Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool,
+                             const CancelToken& cancel, ProgressSink& progress) {
   ReferenceOptions options;
   options.address = job.address;
-  options.normal_convention = ParseNormalConvention(job.normal_convention).value_or(NormalConvention::kAuto);
+  options.normal_convention =
+      ParseNormalConvention(job.normal_convention).value_or(NormalConvention::kAuto);
   options.repair_nonfinite = job.repair_nonfinite;
   options.widen_roughness = job.toksvig;
   options.cancel = &cancel;
 
-  // Hashed before and after reading: a file that is still being copied must not get a container under a wrong name.
-  std::vector<std::string> set_paths;
-  for (const MapSource& map : set.maps) set_paths.push_back(map.path);
-  PATINA_ASSIGN(const std::vector<std::string> before, HashFiles(set_paths, cancel));
+  // Hashed before and after reading: a file that is still being copied must not get a container
+  // under a wrong name.
+  std::vector<std::string> paths;
+  for (const MapSource& map : set.maps) paths.push_back(map.path);
+  PATINA_ASSIGN(const auto before, HashFiles(paths, cancel));
   JobSource source;
   PATINA_ASSIGN(source.reference, BuildReference(set, options, pool, progress));
-  std::vector<std::string> paths;
-  for (const ReferenceFile& file : source.reference.files) paths.push_back(file.path);
-  PATINA_ASSIGN(source.sha256, HashFiles(paths, cancel));
-  for (size_t i = 0; i < paths.size(); ++i) {
-    for (size_t m = 0; m < set_paths.size(); ++m) {
-      if (set_paths[m] == paths[i] && before[m] != source.sha256[i]) {
-        return Fail(ErrorCode::kConflict, paths[i] + ": it changed while it was read; bake again when it is complete");
-      }
+  PATINA_ASSIGN(const auto after, HashFiles(paths, cancel));
+  for (const auto& [path, hash] : after) {
+    if (before.at(path) != hash) {
+      return Fail(ErrorCode::kConflict,
+                  path + ": it changed while it was read; bake again when it is complete");
     }
+  }
+  for (const ReferenceFile& file : source.reference.files) {
+    const auto found = after.find(file.path);
+    if (found == after.end()) {
+      return Fail(ErrorCode::kInternal, file.path + ": read without being a file of the set");
+    }
+    source.sha256.push_back(found->second);
   }
   source.fingerprint = FingerprintOf(job, source.reference, source.sha256);
   return source;
 }
 
-std::string FingerprintOf(const Job& job, const SourceReference& reference, const std::vector<std::string>& sha256) {
+std::string FingerprintOf(const Job& job, const SourceReference& reference,
+                          const std::vector<std::string>& sha256) {
   Sha256 hash;
-  hash.Update("patina material\nrecipe " + std::to_string(kRecipeVersion) + "\njob " + CanonicalJob(job) + "\n");
+  hash.Update("patina material\nrecipe " + std::to_string(kRecipeVersion) + "\njob " +
+              CanonicalJob(job) + "\n");
   for (const ReferenceMap& map : reference.maps) {
     std::string line = "map " + map.role;
     line += " " + (map.file < 0 ? std::string("none") : sha256[static_cast<size_t>(map.file)]);

@@ -20,11 +20,13 @@ struct JobSource {
 
 // Reads the maps of a set as the job wants them.
 // Errors: those of BuildReference; kConflict when a file changed while it was read.
-Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool, const CancelToken& cancel,
-                             ProgressSink& progress);
+Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool,
+                             const CancelToken& cancel, ProgressSink& progress);
 
-// SHA-256 of what decides the bytes of the container: recipe version, canonical job, and for each map its role, the hash of
-// its file and how it is read. Not: where the files lie, what they are called, and when they were written.
-std::string FingerprintOf(const Job& job, const SourceReference& reference, const std::vector<std::string>& sha256);
+// SHA-256 of what decides the bytes of the container: recipe version, canonical job, and for each
+// map its role, the hash of its file and how it is read. Not: where the files lie, what they are
+// called, and when they were written.
+std::string FingerprintOf(const Job& job, const SourceReference& reference,
+                          const std::vector<std::string>& sha256);
 
 }  // namespace patina

@@ -34,8 +34,8 @@ std::string EscapePointer(std::string_view key) {
   return out;
 }
 
-// Parses JSON, refusing what the library would let through: a key that stands twice in one object, and nesting so deep
-// that printing the value would exhaust the stack.
+// Parses JSON, refusing what the library would let through: a key that stands twice in one object,
+// and nesting so deep that printing the value would exhaust the stack.
 Result<Json> ParseJson(std::string_view text, const std::string& source) {
   constexpr int kDeepest = 16;
   std::vector<std::set<std::string>> keys;
@@ -61,11 +61,13 @@ Result<Json> ParseJson(std::string_view text, const std::string& source) {
     return Fail(ErrorCode::kInvalidArgument, source + ": not JSON: " + e.what());
   }
   if (too_deep) {
-    return Fail(ErrorCode::kInvalidArgument,
-                source + ": nested deeper than " + std::to_string(kDeepest) + " levels, which no job is");
+    return Fail(
+        ErrorCode::kInvalidArgument,
+        source + ": nested deeper than " + std::to_string(kDeepest) + " levels, which no job is");
   }
   if (!twice.empty()) {
-    return Fail(ErrorCode::kInvalidArgument, source + ": the key \"" + twice + "\" stands twice in one object; keep one");
+    return Fail(ErrorCode::kInvalidArgument,
+                source + ": the key \"" + twice + "\" stands twice in one object; keep one");
   }
   return json;
 }
@@ -96,7 +98,8 @@ class ObjectReader {
     const std::string& text = value->get_ref<const std::string&>();
     if (text.empty()) return Complain(key, "must not be empty");
     // The schema counts characters; a limit for bytes would refuse text that the schema accepts.
-    const auto characters = std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
+    const auto characters =
+        std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; });
     if (static_cast<size_t>(characters) > longest) {
       return Complain(key, "is longer than " + std::to_string(longest) + " characters");
     }
@@ -104,7 +107,8 @@ class ObjectReader {
     *out = text;
   }
 
-  void Choice(const std::string& key, std::initializer_list<const char*> choices, std::string* out) {
+  void Choice(const std::string& key, std::initializer_list<const char*> choices,
+              std::string* out) {
     const Json* value = Find(key);
     if (value == nullptr) return;
     std::string list;
@@ -138,13 +142,16 @@ class ObjectReader {
     if (value->is_number_unsigned()) {
       number = value->get<uint64_t>();
       good = number <= most;
+    } else if (value->is_number_integer()) {
+      good = value->get<int64_t>() == 0;  // "-0"
     } else if (value->is_number_float()) {
       const double real = value->get<double>();
       good = real >= 0 && real <= static_cast<double>(most) && real == std::floor(real);
       if (good) number = static_cast<uint64_t>(real);
     }
     if (!good) {
-      return Complain(key, "must be a whole number between 0 and " + std::to_string(most) + "; is " + Shown(*value));
+      return Complain(key, "must be a whole number between 0 and " + std::to_string(most) +
+                               "; is " + Shown(*value));
     }
     *out = number;
   }
@@ -158,7 +165,8 @@ class ObjectReader {
 
   void RefuseUnknown() {
     for (const auto& [key, value] : object_.items()) {
-      if (known_.count(key) == 0) Complain(key, "is not a field of this object; fields: " + Known());
+      if (known_.count(key) == 0)
+        Complain(key, "is not a field of this object; fields: " + Known());
     }
   }
 
@@ -180,11 +188,12 @@ std::string Join(const std::string& folder, const std::string& path) {
   return folder.back() == '/' ? folder + path : folder + "/" + path;
 }
 
-std::vector<JobMap> ReadMaps(const Json& list, const std::string& pointer, std::vector<std::string>* problems) {
+std::vector<JobMap> ReadMaps(const Json& list, const std::string& pointer,
+                             std::vector<std::string>* problems) {
   std::vector<JobMap> maps;
   if (!list.is_array() || list.empty() || list.size() > kMaxJobMaps) {
-    problems->push_back((pointer.empty() ? "/" : pointer) + ": must be an array of 1 to " + std::to_string(kMaxJobMaps) +
-                        " maps; is " + Shown(list));
+    problems->push_back((pointer.empty() ? "/" : pointer) + ": must be an array of 1 to " +
+                        std::to_string(kMaxJobMaps) + " maps; is " + Shown(list));
     return maps;
   }
   for (size_t i = 0; i < list.size(); ++i) {
@@ -200,7 +209,8 @@ std::vector<JobMap> ReadMaps(const Json& list, const std::string& pointer, std::
     if (const Json* channels = reader.Find("channels")) {
       const std::string text = channels->is_string() ? channels->get<std::string>() : "";
       if (text.empty() || text.size() > 4 || text.find_first_not_of("rgba") != std::string::npos) {
-        reader.Complain("channels", "must be 1 to 4 of the letters r, g, b and a; is " + Shown(*channels));
+        reader.Complain("channels",
+                        "must be 1 to 4 of the letters r, g, b and a; is " + Shown(*channels));
       } else {
         map.channels = text;
       }
@@ -214,9 +224,11 @@ std::vector<JobMap> ReadMaps(const Json& list, const std::string& pointer, std::
   return maps;
 }
 
-tl::unexpected<Error> FailWithProblems(const std::string& source, const std::vector<std::string>& problems) {
+tl::unexpected<Error> FailWithProblems(const std::string& source,
+                                       const std::vector<std::string>& problems) {
   std::string message = source + ": " + std::to_string(problems.size()) +
-                        (problems.size() == 1 ? " problem" : " problems") + " (see schemas/job.schema.json)";
+                        (problems.size() == 1 ? " problem" : " problems") +
+                        " (see schemas/job.schema.json)";
   for (const std::string& problem : problems) message += "\n  " + problem;
   return Fail(ErrorCode::kInvalidArgument, std::move(message));
 }
@@ -234,12 +246,15 @@ void AssignEnum(const std::string& name, Parse parse, Enum* out) {
 
 }  // namespace
 
-const char* AddressModeName(AddressMode mode) { return mode == AddressMode::kWrap ? "wrap" : "clamp"; }
+const char* AddressModeName(AddressMode mode) {
+  return mode == AddressMode::kWrap ? "wrap" : "clamp";
+}
 
 bool IsAssetName(std::string_view name) {
   if (name.empty() || name.size() > 100 || name[0] == '-' || name[0] == '.') return false;
   return std::all_of(name.begin(), name.end(), [](char c) {
-    return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
+    return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
   });
 }
 
@@ -265,18 +280,21 @@ std::string FolderOfFile(const std::string& path) {
   return slash == 0 ? "/" : path.substr(0, slash);
 }
 
-Result<Job> ParseJob(std::string_view text, const std::string& base_folder, const std::string& source) {
+Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
+                     const std::string& source) {
   PATINA_ASSIGN(const Json json, ParseJson(text, source));
   if (!json.is_object()) {
-    return Fail(ErrorCode::kInvalidArgument, source + ": a job is a JSON object; this is " + Shown(json));
+    return Fail(ErrorCode::kInvalidArgument,
+                source + ": a job is a JSON object; this is " + Shown(json));
   }
   std::vector<std::string> problems;
   ObjectReader reader(json, "", &problems);
   if (const Json* version = reader.Find("version", true)) {
     if (version->is_number_integer() && version->get<int64_t>() > kJobVersion) {
-      return Fail(ErrorCode::kUnsupported, source + ": /version: this program knows jobs up to version " +
-                                               std::to_string(kJobVersion) + "; this one is version " + Shown(*version) +
-                                               "; use a newer patina");
+      return Fail(ErrorCode::kUnsupported,
+                  source + ": /version: this program knows jobs up to version " +
+                      std::to_string(kJobVersion) + "; this one is version " + Shown(*version) +
+                      "; use a newer patina");
     }
     if (*version != kJobVersion) reader.Complain("version", "must be 1; is " + Shown(*version));
   }
@@ -287,12 +305,14 @@ Result<Job> ParseJob(std::string_view text, const std::string& base_folder, cons
   Job job;
   reader.Text("asset", true, 100, &job.asset);
   if (!job.asset.empty() && !IsAssetName(job.asset)) {
-    reader.Complain("asset", "must be made of A-Z a-z 0-9 _ - . and not start with - or '.'; is " + Shown(Json(job.asset)));
+    reader.Complain("asset", "must be made of A-Z a-z 0-9 _ - . and not start with - or '.'; is " +
+                                 Shown(Json(job.asset)));
   }
   reader.Text("folder", false, 4096, &job.folder);
   reader.Text("set", false, 255, &job.set);
   if (const Json* maps = reader.Find("maps")) job.maps = ReadMaps(*maps, "/maps", &problems);
-  if (!json.contains("folder") && !json.contains("maps")) reader.Complain("folder", "is missing: give \"folder\" or \"maps\"");
+  if (!json.contains("folder") && !json.contains("maps"))
+    reader.Complain("folder", "is missing: give \"folder\" or \"maps\"");
   reader.Text("out", true, 4096, &job.out);
   std::string profile, quality, recipe, address;
   reader.Choice("profile", {"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
@@ -366,7 +386,8 @@ std::string JobToJson(const Job& job) {
   if (job.samples > 0) json["samples"] = job.samples;
   if (job.min_psnr_db > 0) json["min_psnr_db"] = job.min_psnr_db;
   if (job.address != defaults.address) json["address"] = AddressModeName(job.address);
-  if (job.normal_convention != defaults.normal_convention) json["normal_convention"] = job.normal_convention;
+  if (job.normal_convention != defaults.normal_convention)
+    json["normal_convention"] = job.normal_convention;
   if (job.repair_nonfinite) json["repair_nonfinite"] = true;
   if (!job.toksvig) json["toksvig"] = false;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

@@ -15,31 +15,34 @@ namespace patina {
 inline constexpr int kJobVersion = 1;
 inline constexpr size_t kMaxJobBytes = size_t{4} << 20;  // larger job files are refused
 inline constexpr size_t kMaxJobMaps = 64;
-inline constexpr uint64_t kMaxSeed = 9007199254740991;   // 2^53 - 1, exact in every JSON reader
+inline constexpr uint64_t kMaxSeed = 9007199254740991;  // 2^53 - 1, exact in every JSON reader
 inline constexpr int kMaxThreads = 256;
 
 // One entry of an explicit list of maps. Empty text means the default.
 struct JobMap {
   std::string role;
-  std::string file;          // absolute, or relative to Job::maps_folder
-  std::string channels;      // letters of "rgba" in the order of the map's components; "" = the file's first ones
+  std::string file;      // absolute, or relative to Job::maps_folder
+  std::string channels;  // letters of "rgba" in the order of the map's components; "" = the file's
+                         // first ones
   std::string color_space = "auto";  // "auto", "srgb", "linear", "raw"
   std::string convention = "auto";   // "auto", "opengl", "directx"; of normal maps
-  bool invert = false;       // the file holds 1 - value
+  bool invert = false;               // the file holds 1 - value
 };
 
 struct Job {
   std::string asset;
-  std::string folder;        // of the maps; may be empty when `maps` is not
-  std::string set;           // name of the one meant when `folder` holds several materials; may be empty when it does not
+  std::string folder;  // of the maps; may be empty when `maps` is not
+  std::string set;     // name of the one meant when `folder` holds several materials; may be empty
+                       // when it does not
   std::vector<JobMap> maps;  // empty: found by file name in `folder`
-  std::string maps_folder;   // what files of `maps` are relative to: `folder`, or the job file's folder
+  std::string
+      maps_folder;  // what files of `maps` are relative to: `folder`, or the job file's folder
   std::string out;
   Profile profile = Profile::kBcf1k;
   Quality quality = Quality::kStandard;
   Recipe recipe = Recipe::kPatina;
   uint64_t seed = 1;
-  int threads = 0;           // 0: one for each CPU this process may use
+  int threads = 0;            // 0: one for each CPU this process may use
   double target_psnr_db = 0;  // 0: none
   double time_budget_s = 0;   // 0: none
   double samples = 0;         // 0: by quality and size
@@ -50,10 +53,12 @@ struct Job {
   bool toksvig = true;
 };
 
-// Parses a job. Relative folders are made relative to `base_folder` ("" leaves them as they are). `source` names the text in messages.
-// Errors: kInvalidArgument with the complete list of what is wrong, one line each with its JSON pointer, or the line and
-// column where the text is not JSON; kUnsupported for a newer version.
-Result<Job> ParseJob(std::string_view text, const std::string& base_folder, const std::string& source);
+// Parses a job. Relative folders are made relative to `base_folder` ("" leaves them as they are).
+// `source` names the text in messages. Errors: kInvalidArgument with the complete list of what is
+// wrong, one line each with its JSON pointer, or the line and column where the text is not JSON;
+// kUnsupported for a newer version.
+Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
+                     const std::string& source);
 
 // ParseJob of a file. Also kNotFound, kIo, kOutOfRange (larger than kMaxJobBytes).
 Result<Job> ReadJobFile(const std::string& path);
@@ -67,15 +72,17 @@ std::string FolderOfFile(const std::string& path);
 // The job as a job file: every field that is not its default, paths as they stand.
 std::string JobToJson(const Job& job);
 
-// What of a job decides the bytes of its result, as text for the fingerprint: every field with its value in a fixed
-// order, without the folder and set it reads and the folder it writes to, the thread count and the quality gate. Files of `maps` stand as
-// their last path component; their content enters the fingerprint by hash.
+// What of a job decides the bytes of its result, as text for the fingerprint: every field with its
+// value in a fixed order, without the folder and set it reads and the folder it writes to, the
+// thread count and the quality gate. Files of `maps` stand as their last path component; their
+// content enters the fingerprint by hash.
 std::string CanonicalJob(const Job& job);
 
 // Whether a name can be an asset's: 1 to 100 of A-Z a-z 0-9 _ - . and not starting with - or '.'.
 bool IsAssetName(std::string_view name);
 
-// An asset name from the last component of a path: everything else becomes '_'. "asset" if nothing is left.
+// An asset name from the last component of a path: everything else becomes '_'. "asset" if nothing
+// is left.
 std::string AssetNameFromPath(const std::string& path);
 
 const char* AddressModeName(AddressMode mode);  // "wrap", "clamp"

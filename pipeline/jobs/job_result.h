@@ -1,4 +1,5 @@
-// How a job ended: the content of result.json and of `--json`. Described by schemas/result.schema.json.
+// How a job ended: the content of result.json and of `--json`. Described by
+// schemas/result.schema.json.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +27,8 @@ struct PsnrSummary {
   double overall_db = 0;
   double mip0_db = 0;
   double mean_mips_db = 0;
-  std::vector<std::pair<std::string, double>> maps;  // role -> dB over all mips, in the manifest's order
+  std::vector<std::pair<std::string, double>>
+      maps;  // role -> dB over all mips, in the manifest's order
 };
 
 struct JobResult {

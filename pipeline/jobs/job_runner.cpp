@@ -25,12 +25,15 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double Since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double Since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 // Names the stage in every report, and remembers the warnings.
 class StageSink : public ProgressSink {
  public:
-  StageSink(JobObserver& observer, std::vector<std::string>* warnings) : observer_(observer), warnings_(warnings) {}
+  StageSink(JobObserver& observer, std::vector<std::string>* warnings)
+      : observer_(observer), warnings_(warnings) {}
 
   void SetStage(const std::string& stage) { stage_ = stage; }
   void OnProgress(const ProgressEvent& event) override {
@@ -69,13 +72,15 @@ class JobRun {
       status = RunStages();
     } catch (const std::bad_alloc&) {
       status = Fail(ErrorCode::kResourceExhausted,
-                    "not enough memory; use a smaller source, close other programs, or bake on a machine with more");
+                    "not enough memory; use a smaller source, close other programs, or bake on a "
+                    "machine with more");
     }
     staging_.reset();
     if (!status) {
       result_.error = status.error();
       result_.error_stage = stage_;
-      if (result_.exit_code == kExitDone) result_.exit_code = ExitCodeFor(status.error(), reading_input_);
+      if (result_.exit_code == kExitDone)
+        result_.exit_code = ExitCodeFor(status.error(), reading_input_);
     }
     result_.seconds = Since(start_);
     result_.cpu_seconds = ProcessCpuSeconds() - start_cpu_;
@@ -97,7 +102,8 @@ class JobRun {
 
   template <class Body>
   Status Stage(const char* name, Body body) {
-    if (cancel_.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted before it was done; nothing was published");
+    if (cancel_.cancelled())
+      return Fail(ErrorCode::kCancelled, "interrupted before it was done; nothing was published");
     stage_ = name;
     sink_.SetStage(name);
     observer_.OnStageStarted(name);
@@ -150,12 +156,14 @@ class JobRun {
     options.cancel = &cancel_;
     if (job_.time_budget_s > 0) {
       // The budget is for the whole job: leave time for what follows the training.
-      constexpr double kSecondsPerTexelChannel = 5e-8;
-      const double later = kSecondsPerTexelChannel * source_.reference.width * source_.reference.height *
-                           static_cast<double>(material.channels.size());
+      constexpr double kCpuSecondsPerTexelChannel = 1e-7;
+      const double later = kCpuSecondsPerTexelChannel * source_.reference.width *
+                           source_.reference.height *
+                           static_cast<double>(material.channels.size()) / pool_->threads();
       options.time_budget_s = std::max(0.1, job_.time_budget_s - Since(start_) - later);
     }
-    const ModelShape shape = ShapeForProfile(job_.profile, source_.reference.width, source_.reference.height);
+    const ModelShape shape =
+        ShapeForProfile(job_.profile, source_.reference.width, source_.reference.height);
     PATINA_ASSIGN(TrainedMaterial model, TrainMaterial(material, shape, options, *pool_, sink_));
     result_.samples = model.samples;
     result_.stopped_by = model.stopped_by;
@@ -177,8 +185,8 @@ class JobRun {
 
   Status Verify() {
     PATINA_TRY(VerifyPayloads({staging_->directory(), WithPayloads()}));
-    PATINA_ASSIGN(measurement_, MeasureContainer(staging_->directory(), source_.reference.material, *pool_, cancel_, sink_,
-                                                 &preview_));
+    PATINA_ASSIGN(measurement_, MeasureContainer(staging_->directory(), source_.reference.material,
+                                                 *pool_, cancel_, sink_, &preview_));
     result_.psnr = SummarizePsnr(measurement_.quality);
     result_.ssim = measurement_.quality.ssim;
     result_.flip = measurement_.quality.flip;
@@ -191,8 +199,8 @@ class JobRun {
   }
 
   Status Report() {
-    const std::string report =
-        ReportToJson(manifest_, staging_->payloads(), source_, measurement_, model_ ? &*model_ : nullptr);
+    const std::string report = ReportToJson(manifest_, staging_->payloads(), source_, measurement_,
+                                            model_ ? &*model_ : nullptr);
     PATINA_TRY(AddPreview());
     PATINA_TRY(staging_->AddPayload("report.json", "report", AsBytes(report)));
     return staging_->WriteManifest(manifest_);
@@ -200,12 +208,15 @@ class JobRun {
 
   Status AddPreview() {
     std::vector<std::string> labels;
-    for (const auto& [role, db] : result_.psnr->maps) labels.push_back(role + "  " + OneDecimal(db) + " dB");
+    for (const auto& [role, db] : result_.psnr->maps)
+      labels.push_back(role + "  " + OneDecimal(db) + " dB");
     const RgbImage sheet = preview_.Compose(
-        job_.asset + "  " + manifest_.profile + "  " + OneDecimal(result_.psnr->overall_db) + " dB", labels);
+        job_.asset + "  " + manifest_.profile + "  " + OneDecimal(result_.psnr->overall_db) + " dB",
+        labels);
     // Images are written to files only; the payload is its bytes.
     const std::string path = staging_->directory() + "/preview.tmp.png";
-    PATINA_TRY(WriteImage(path, WriteFormat::kPng8, sheet.width, sheet.height, 3, sheet.rgb.data()));
+    PATINA_TRY(
+        WriteImage(path, WriteFormat::kPng8, sheet.width, sheet.height, 3, sheet.rgb.data()));
     auto bytes = ReadFile(path, uint64_t{1} << 30);
     std::error_code ignored;
     std::filesystem::remove(path, ignored);
@@ -226,17 +237,20 @@ class JobRun {
   // Keeps what missed the gate for a look, in place of what missed it before.
   Status Reject() {
     PATINA_TRY(AddRunRecord());
-    const std::filesystem::path rejected = std::filesystem::path(job_.out) / job_.asset / "rejected";
+    const std::filesystem::path rejected =
+        std::filesystem::path(job_.out) / job_.asset / "rejected";
     std::error_code error;
     std::filesystem::remove_all(rejected, error);
     if (!error) std::filesystem::rename(staging_->directory(), rejected, error);
-    if (error) return FailErrno(error.value(), "cannot keep the rejected container as", rejected.string());
+    if (error)
+      return FailErrno(error.value(), "cannot keep the rejected container as", rejected.string());
     result_.container = rejected.string();
     result_.exit_code = kExitQualityGate;
     return Fail(ErrorCode::kOutOfRange,
-                "the overall PSNR is " + TwoDecimals(result_.psnr->overall_db) + " dB, below the gate of " +
-                    TwoDecimals(job_.min_psnr_db) + " dB; nothing was published, the result is kept in " +
-                    result_.container + "; try a higher --quality or a larger --profile");
+                "the overall PSNR is " + TwoDecimals(result_.psnr->overall_db) +
+                    " dB, below the gate of " + TwoDecimals(job_.min_psnr_db) +
+                    " dB; nothing was published, the result is kept in " + result_.container +
+                    "; try a higher --quality or a larger --profile");
   }
 
   Status AddRunRecord() {
@@ -253,7 +267,8 @@ class JobRun {
     record.peak_memory_bytes = PeakMemoryBytes();
     record.samples = result_.samples;
     for (const StageCost& stage : stages_) {
-      if (stage.stage == "train" && stage.seconds > 0) record.samples_per_s = result_.samples / stage.seconds;
+      if (stage.stage == "train" && stage.seconds > 0)
+        record.samples_per_s = result_.samples / stage.seconds;
     }
     record.stages = stages_;
     if (model_) record.curve = model_->curve;

@@ -16,7 +16,8 @@ struct Folder {
 Result<Folder> ListFolder(const std::string& path) {
   Folder folder;
   std::error_code error;
-  for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error)) {
+  for (fs::directory_iterator entry(path, error), end; !error && entry != end;
+       entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     std::error_code ignored;
     if (entry->is_directory(ignored)) {
@@ -49,7 +50,8 @@ std::string Names(const std::vector<MapSet>& sets) {
 // A file's name for the manifest, without where it lies on this machine.
 std::string PortableName(const std::string& file) {
   const fs::path path = fs::path(file).lexically_normal();
-  return path.is_absolute() || *path.begin() == ".." ? path.filename().string() : path.generic_string();
+  return path.is_absolute() || *path.begin() == ".." ? path.filename().string()
+                                                     : path.generic_string();
 }
 
 bool SameFolder(const std::string& a, const std::string& b) {
@@ -81,22 +83,25 @@ Result<MapSet> MapsOfJob(const Job& job) {
   PATINA_ASSIGN(std::vector<MapSet> sets, FindMaps(job.folder));
   if (job.set.empty()) {
     if (sets.size() == 1) return std::move(sets[0]);
-    return Fail(ErrorCode::kInvalidArgument, "the folder " + job.folder + " holds several materials: " + Names(sets) +
-                                                 "; name one in the job's \"set\", or bake the folder with `patina bake`");
+    return Fail(ErrorCode::kInvalidArgument,
+                "the folder " + job.folder + " holds several materials: " + Names(sets) +
+                    "; name one in the job's \"set\", or bake the folder with `patina bake`");
   }
   for (MapSet& set : sets) {
     if (set.name == job.set) return std::move(set);
   }
-  return Fail(ErrorCode::kNotFound, "the folder " + job.folder + " holds no material named \"" + job.set +
-                                        "\"; it holds " + Names(sets));
+  return Fail(ErrorCode::kNotFound, "the folder " + job.folder + " holds no material named \"" +
+                                        job.set + "\"; it holds " + Names(sets));
 }
 
 Result<FoundAssets> FindAssets(const std::string& folder, const std::string& except) {
   std::error_code error;
   const fs::file_status status = fs::status(folder, error);
-  if (!fs::exists(status)) return Fail(ErrorCode::kNotFound, "there is no folder " + folder + "; check the path");
+  if (!fs::exists(status))
+    return Fail(ErrorCode::kNotFound, "there is no folder " + folder + "; check the path");
   if (!fs::is_directory(status)) {
-    return Fail(ErrorCode::kInvalidArgument, folder + " is neither a folder nor a job file (*.json)");
+    return Fail(ErrorCode::kInvalidArgument,
+                folder + " is neither a folder nor a job file (*.json)");
   }
   FoundAssets found;
   auto sets = FindMaps(folder);

@@ -28,7 +28,8 @@ const char* DecoderEncodingName(Decoder::Encoding encoding) {
 metrics::MapKind KindOf(const TargetChannel& first, int channels) {
   if (first.encoding == Encoding::kNormalXy) return metrics::MapKind::kNormalXy;
   if (channels != 3) return metrics::MapKind::kData;
-  return first.encoding == Encoding::kSrgb ? metrics::MapKind::kSrgbColor : metrics::MapKind::kLinearColor;
+  return first.encoding == Encoding::kSrgb ? metrics::MapKind::kSrgbColor
+                                           : metrics::MapKind::kLinearColor;
 }
 
 // A channel that both sides have.
@@ -48,7 +49,8 @@ void AddOnce(const std::string& name, std::vector<std::string>* names) {
   if (std::find(names->begin(), names->end(), name) == names->end()) names->push_back(name);
 }
 
-Result<Layout> MatchChannels(const std::string& directory, const Decoder& decoder, const MaterialReference& reference) {
+Result<Layout> MatchChannels(const std::string& directory, const Decoder& decoder,
+                             const MaterialReference& reference) {
   Layout layout;
   auto in_container = [&](const TargetChannel& channel) -> const Decoder::Channel* {
     for (const Decoder::Channel& other : decoder.channels()) {
@@ -63,10 +65,11 @@ Result<Layout> MatchChannels(const std::string& directory, const Decoder& decode
       continue;
     }
     if (std::string(EncodingName(channel.encoding)) != DecoderEncodingName(decoded->encoding)) {
-      return Fail(ErrorCode::kConflict, directory + ": its " + channel.map + " is coded as \"" +
-                                            DecoderEncodingName(decoded->encoding) + "\", that of the source as \"" +
-                                            EncodingName(channel.encoding) +
-                                            "\"; compare it with maps of the kind it was baked from");
+      return Fail(ErrorCode::kConflict,
+                  directory + ": its " + channel.map + " is coded as \"" +
+                      DecoderEncodingName(decoded->encoding) + "\", that of the source as \"" +
+                      EncodingName(channel.encoding) +
+                      "\"; compare it with maps of the kind it was baked from");
     }
     if (layout.maps.empty() || layout.maps.back().name != channel.map) {
       layout.maps.push_back({channel.map, metrics::MapKind::kData, 0, false});
@@ -75,8 +78,9 @@ Result<Layout> MatchChannels(const std::string& directory, const Decoder& decode
     layout.channels.push_back({&channel, decoded});
   }
   for (const Decoder::Channel& channel : decoder.channels()) {
-    const bool known = std::any_of(reference.channels.begin(), reference.channels.end(),
-                                   [&](const TargetChannel& other) { return other.map == channel.map; });
+    const bool known =
+        std::any_of(reference.channels.begin(), reference.channels.end(),
+                    [&](const TargetChannel& other) { return other.map == channel.map; });
     if (!known) AddOnce(channel.map, &layout.not_compared);
   }
   if (layout.channels.empty()) {
@@ -87,7 +91,8 @@ Result<Layout> MatchChannels(const std::string& directory, const Decoder& decode
   for (metrics::QualityMap& map : layout.maps) {
     map.kind = KindOf(*layout.channels[first].reference, map.channels);
     first += static_cast<size_t>(map.channels);
-    const bool color = map.kind == metrics::MapKind::kSrgbColor || map.kind == metrics::MapKind::kLinearColor;
+    const bool color =
+        map.kind == metrics::MapKind::kSrgbColor || map.kind == metrics::MapKind::kLinearColor;
     if (color && (seen == nullptr || map.name == "albedo")) seen = &map;
   }
   if (seen != nullptr) seen->flip = true;
@@ -107,7 +112,8 @@ class LevelPlanes {
     pool.ParallelFor((height_ + kRowsPerTask - 1) / kRowsPerTask, [&](int task, int) {
       const int begin = task * kRowsPerTask;
       const int end = std::min(height_, begin + kRowsPerTask);
-      decoder.DecodeRows(index, begin, end, decoded_.data() + static_cast<size_t>(begin) * width_, plane_);
+      decoder.DecodeRows(index, begin, end, decoded_.data() + static_cast<size_t>(begin) * width_,
+                         plane_);
       bool rows_finite = true;
       for (int o = 0; o < decoder.outputs(); ++o) {
         const float* row = decoded_.data() + o * plane_ + static_cast<size_t>(begin) * width_;
@@ -141,7 +147,8 @@ class LevelPlanes {
 
  private:
   metrics::PlanarView Plane(const AlignedBuffer<float>& planes, int index) const {
-    return metrics::DensePlane(planes.data() + static_cast<size_t>(index) * plane_, width_, height_);
+    return metrics::DensePlane(planes.data() + static_cast<size_t>(index) * plane_, width_,
+                               height_);
   }
 
   void Deinterleave(const TargetLevel& level, int y) {
@@ -149,7 +156,8 @@ class LevelPlanes {
       const float* block = level.Block(xb, y);
       const size_t bytes = static_cast<size_t>(std::min(16, width_ - 16 * xb)) * sizeof(float);
       for (int c = 0; c < level.channels; ++c) {
-        float* row = reference_.data() + static_cast<size_t>(c) * plane_ + static_cast<size_t>(y) * width_;
+        float* row =
+            reference_.data() + static_cast<size_t>(c) * plane_ + static_cast<size_t>(y) * width_;
         __builtin_memcpy(row + 16 * xb, block + 16 * c, bytes);
       }
     }
@@ -164,8 +172,10 @@ class LevelPlanes {
 
 }  // namespace
 
-Result<Measurement> MeasureContainer(const std::string& directory, const MaterialReference& reference, ThreadPool& pool,
-                                     const CancelToken& cancel, ProgressSink& progress, Preview* preview) {
+Result<Measurement> MeasureContainer(const std::string& directory,
+                                     const MaterialReference& reference, ThreadPool& pool,
+                                     const CancelToken& cancel, ProgressSink& progress,
+                                     Preview* preview) {
   const auto start = std::chrono::steady_clock::now();
   Decoder decoder;
   std::string problem;
@@ -173,9 +183,10 @@ Result<Measurement> MeasureContainer(const std::string& directory, const Materia
   const std::vector<TargetLevel>& levels = reference.pyramid.levels;
   if (static_cast<int>(levels.size()) != decoder.levels() || levels[0].width != decoder.width() ||
       levels[0].height != decoder.height()) {
-    return Fail(ErrorCode::kConflict, directory + ": it is for " + std::to_string(decoder.width()) + " x " +
-                                          std::to_string(decoder.height()) + " texels, the source has " +
-                                          std::to_string(levels[0].width) + " x " + std::to_string(levels[0].height));
+    return Fail(ErrorCode::kConflict,
+                directory + ": it is for " + std::to_string(decoder.width()) + " x " +
+                    std::to_string(decoder.height()) + " texels, the source has " +
+                    std::to_string(levels[0].width) + " x " + std::to_string(levels[0].height));
   }
   PATINA_ASSIGN(Layout layout, MatchChannels(directory, decoder, reference));
   metrics::QualityMeter meter(layout.maps);
@@ -188,18 +199,20 @@ Result<Measurement> MeasureContainer(const std::string& directory, const Materia
     if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
     planes.Load(decoder, levels[i], static_cast<int>(i), pool);
     if (!planes.finite()) {
-      return Fail(ErrorCode::kInternal,
-                  directory + ": mip " + std::to_string(i) + " decodes to a value that is not finite");
+      return Fail(ErrorCode::kInternal, directory + ": mip " + std::to_string(i) +
+                                            " decodes to a value that is not finite");
     }
     pairs.clear();
     for (const ChannelPair& channel : layout.channels) pairs.push_back(planes.Pair(channel));
     meter.AddLevel(levels[i].width, levels[i].height, pairs, pool);
-    if (i == 0 && preview != nullptr) preview->Capture(layout.maps, levels[0].width, levels[0].height, pairs, pool);
+    if (i == 0 && preview != nullptr)
+      preview->Capture(layout.maps, levels[0].width, levels[0].height, pairs, pool);
     done += static_cast<double>(levels[i].width) * levels[i].height;
     ProgressEvent event;
     event.stage = "verify";
     event.fraction = done / texels;
-    event.elapsed_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    event.elapsed_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     progress.OnProgress(event);
   }
   return Measurement{meter.Finish(), std::move(layout.not_compared)};
@@ -210,7 +223,8 @@ PsnrSummary SummarizePsnr(const metrics::QualityResult& quality) {
   summary.overall_db = CapPsnr(quality.psnr.overall_db);
   summary.mip0_db = CapPsnr(quality.psnr.mip0_db);
   summary.mean_mips_db = CapPsnr(quality.psnr.mean_mips_db);
-  for (const metrics::MapQuality& map : quality.maps) summary.maps.emplace_back(map.name, CapPsnr(map.psnr.overall_db));
+  for (const metrics::MapQuality& map : quality.maps)
+    summary.maps.emplace_back(map.name, CapPsnr(map.psnr.overall_db));
   return summary;
 }
 

@@ -1,4 +1,5 @@
-// Measures a written container against a reference: the one definition of quality for `bake` and `compare`.
+// Measures a written container against a reference: the one definition of quality for `bake` and
+// `compare`.
 #pragma once
 
 #include <string>
@@ -23,20 +24,25 @@ struct Measurement {
   std::vector<std::string> not_compared;  // maps of only one of the two
 };
 
-// Decodes all mips of the container in `directory` with the reference decoder (formats/decoder), from its files alone, and
-// compares them with the reference on texel centres.
+// Decodes all mips of the container in `directory` with the reference decoder (formats/decoder),
+// from its files alone, and compares them with the reference on texel centres.
 //
-// PSNR: on coded values (sRGB for colour of integer files, 0.5 + 0.5 n for normals), peak 1. The squared error of a mip is
-// its mean over all texels and all channels of the source: z of normals (rebuilt from x and y on both sides) and constant
-// channels count like every other, so a plain base colour, normal, packed set has nine. Overall: from the mean of that over
-// all mips from 0 down to 1x1, each mip with the same weight (Weinreich 2024). mean_mips: the mean of the PSNRs of the mips.
-// SSIM, FLIP (of the base colour, or the first colour map) and the angle between normals: mip 0 only, for time.
+// PSNR: on coded values (sRGB for colour of integer files, 0.5 + 0.5 n for normals), peak 1. The
+// squared error of a mip is its mean over all texels and all channels of the source: z of normals
+// (rebuilt from x and y on both sides) and constant channels count like every other, so a plain
+// base colour, normal, packed set has nine. Overall: from the mean of that over all mips from 0
+// down to 1x1, each mip with the same weight (Weinreich 2024). mean_mips: the mean of the PSNRs of
+// the mips. SSIM, FLIP (of the base colour, or the first colour map) and the angle between normals:
+// mip 0 only, for time.
 //
 // preview: null, or receives pictures of mip 0.
-// Errors: kNotFound, kCorruptData, kUnsupported, kResourceExhausted from the decoder; kConflict when sizes or encodings
-// differ or no map is in both; kInternal for a decoded value that is not finite; kCancelled.
-Result<Measurement> MeasureContainer(const std::string& directory, const MaterialReference& reference, ThreadPool& pool,
-                                     const CancelToken& cancel, ProgressSink& progress, Preview* preview);
+// Errors: kNotFound, kCorruptData, kUnsupported, kResourceExhausted from the decoder; kConflict
+// when sizes or encodings differ or no map is in both; kInternal for a decoded value that is not
+// finite; kCancelled.
+Result<Measurement> MeasureContainer(const std::string& directory,
+                                     const MaterialReference& reference, ThreadPool& pool,
+                                     const CancelToken& cancel, ProgressSink& progress,
+                                     Preview* preview);
 
 PsnrSummary SummarizePsnr(const metrics::QualityResult& quality);
 

@@ -15,7 +15,8 @@ constexpr const char* kWeightsName = "decoder.weights";
 std::string FeatureName(int texture) { return "features_" + std::to_string(texture) + ".dds"; }
 
 Status AsInternal(Status status) {
-  if (!status && status.error().code == ErrorCode::kInvalidArgument) status.error().code = ErrorCode::kInternal;
+  if (!status && status.error().code == ErrorCode::kInvalidArgument)
+    status.error().code = ErrorCode::kInternal;
   return status;
 }
 
@@ -24,7 +25,8 @@ std::string ManifestPath(const std::string& file) {
   if (CheckRelativePath(file, "")) return file;
   std::string name = std::filesystem::path(file).filename().string();
   for (char& c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '.';
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '.';
     if (!plain) c = '_';
   }
   if (name.size() > 100) name = name.substr(name.size() - 100);
@@ -97,8 +99,9 @@ void DescribeModel(const TrainedMaterial& model, Manifest* manifest) {
   manifest->training.float_psnr_mean_mips_db = CapPsnr(model.float_psnr_mean_mips_db);
   manifest->training.rollbacks = model.rollbacks;
   for (const CurvePoint& point : model.curve) {
-    manifest->training.curve.push_back(
-        {static_cast<uint64_t>(point.samples), CapPsnr(point.psnr_mip0_db), CapPsnr(point.psnr_mean_mips_db)});
+    manifest->training.curve.push_back({static_cast<uint64_t>(point.samples),
+                                        CapPsnr(point.psnr_mip0_db),
+                                        CapPsnr(point.psnr_mean_mips_db)});
   }
 }
 
@@ -107,7 +110,8 @@ void DescribeModel(const TrainedMaterial& model, Manifest* manifest) {
 Status AddModel(const TrainedMaterial& model, StagingArea* staging) {
   for (int t = 0; t < kFeatureTextures; ++t) {
     const FeatureShape& shape = model.shape[static_cast<size_t>(t)];
-    auto bytes = EncodeDds(bc6h::Format::kUf16, shape.width, shape.height, model.blocks[static_cast<size_t>(t)]);
+    auto bytes = EncodeDds(bc6h::Format::kUf16, shape.width, shape.height,
+                           model.blocks[static_cast<size_t>(t)]);
     if (!bytes) return AsInternal(Fail(bytes.error(), FeatureName(t)));
     PATINA_TRY(staging->AddPayload(FeatureName(t), "features", *bytes));
   }

@@ -11,8 +11,9 @@
 
 namespace patina {
 
-// Adds features_0.dds ... and decoder.weights. Errors: those of EncodeDds, PackNetwork and StagingArea::AddPayload;
-// kInternal in place of kInvalidArgument, since what was trained must be writable.
+// Adds features_0.dds ... and decoder.weights. Errors: those of EncodeDds, PackNetwork and
+// StagingArea::AddPayload; kInternal in place of kInvalidArgument, since what was trained must be
+// writable.
 Status AddModel(const TrainedMaterial& model, StagingArea* staging);
 
 // The manifest of a container, without its quality. model: null when every channel is constant.

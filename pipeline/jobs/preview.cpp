@@ -12,8 +12,8 @@ namespace patina {
 namespace {
 
 using metrics::MapKind;
-using metrics::PlanePair;
 using metrics::PlanarView;
+using metrics::PlanePair;
 using Rgb = std::array<float, 3>;
 
 constexpr int kGap = 10;
@@ -71,7 +71,8 @@ void Write(std::string_view text, int left, int top, RgbImage* sheet) {
         const int column = left + static_cast<int>(i) * kGlyphWidth * kTextScale + x;
         if (column >= sheet->width || top + y >= sheet->height) continue;
         if (!GlyphPixel(text[i], x / kTextScale, y / kTextScale)) continue;
-        float* pixel = sheet->rgb.data() + (static_cast<size_t>(top + y) * sheet->width + column) * 3;
+        float* pixel =
+            sheet->rgb.data() + (static_cast<size_t>(top + y) * sheet->width + column) * 3;
         std::fill(pixel, pixel + 3, kInk);
       }
     }
@@ -84,8 +85,10 @@ void Preview::Capture(std::span<const metrics::QualityMap> maps, int width, int 
                       std::span<const PlanePair> planes, ThreadPool& pool) {
   rows_.clear();
   const int longer = std::max(width, height);
-  const int small_width = longer <= kTile ? width : std::max(1, static_cast<int>(int64_t{width} * kTile / longer));
-  const int small_height = longer <= kTile ? height : std::max(1, static_cast<int>(int64_t{height} * kTile / longer));
+  const int small_width =
+      longer <= kTile ? width : std::max(1, static_cast<int>(int64_t{width} * kTile / longer));
+  const int small_height =
+      longer <= kTile ? height : std::max(1, static_cast<int>(int64_t{height} * kTile / longer));
   const int detail_width = std::min(width, kTile);
   const int detail_height = std::min(height, kTile);
   const int detail_x = (width - detail_width) / 2;
@@ -140,8 +143,10 @@ void Preview::Capture(std::span<const metrics::QualityMap> maps, int width, int 
         const Rgb s = source.Shown(detail_x + x, detail_y + y);
         const Rgb t = decoded.Shown(detail_x + x, detail_y + y);
         const size_t at = (static_cast<size_t>(y) * detail_width + x) * 3;
-        std::copy(s.begin(), s.end(), row.source_detail.rgb.begin() + static_cast<std::ptrdiff_t>(at));
-        std::copy(t.begin(), t.end(), row.decoded_detail.rgb.begin() + static_cast<std::ptrdiff_t>(at));
+        std::copy(s.begin(), s.end(),
+                  row.source_detail.rgb.begin() + static_cast<std::ptrdiff_t>(at));
+        std::copy(t.begin(), t.end(),
+                  row.decoded_detail.rgb.begin() + static_cast<std::ptrdiff_t>(at));
       }
     }
     rows_.push_back(std::move(row));
@@ -149,20 +154,24 @@ void Preview::Capture(std::span<const metrics::QualityMap> maps, int width, int 
 }
 
 RgbImage Preview::Compose(const std::string& title, std::span<const std::string> labels) const {
-  const int row_height = rows_.empty() ? 0 : std::max(rows_[0].source.height, rows_[0].source_detail.height);
+  const int row_height =
+      rows_.empty() ? 0 : std::max(rows_[0].source.height, rows_[0].source_detail.height);
   const int width = kColumns * (kTile + kGap) + kGap;
   const int top = kGap + 2 * kLabelHeight;
   const int height = top + static_cast<int>(rows_.size()) * (kLabelHeight + row_height + kGap);
   RgbImage sheet = MakeImage(width, height, kBackground);
   Write(title, kGap, kGap, &sheet);
-  static constexpr std::string_view kHeads[kColumns] = {"source", "decoded", "difference x8", "source 1:1", "decoded 1:1"};
-  for (int c = 0; c < kColumns; ++c) Write(kHeads[c], kGap + c * (kTile + kGap), kGap + kLabelHeight, &sheet);
+  static constexpr std::string_view kHeads[kColumns] = {"source", "decoded", "difference x8",
+                                                        "source 1:1", "decoded 1:1"};
+  for (int c = 0; c < kColumns; ++c)
+    Write(kHeads[c], kGap + c * (kTile + kGap), kGap + kLabelHeight, &sheet);
   for (size_t i = 0; i < rows_.size(); ++i) {
     const int y = top + static_cast<int>(i) * (kLabelHeight + row_height + kGap);
     if (i < labels.size()) Write(labels[i], kGap, y, &sheet);
     const RgbImage* pictures[kColumns] = {&rows_[i].source, &rows_[i].decoded, &rows_[i].difference,
                                           &rows_[i].source_detail, &rows_[i].decoded_detail};
-    for (int c = 0; c < kColumns; ++c) Paste(*pictures[c], kGap + c * (kTile + kGap), y + kLabelHeight, &sheet);
+    for (int c = 0; c < kColumns; ++c)
+      Paste(*pictures[c], kGap + c * (kTile + kGap), y + kLabelHeight, &sheet);
   }
   return sheet;
 }

@@ -1,4 +1,5 @@
-// The contact sheet of a container: for each map the source, what the container decodes to, and their difference.
+// The contact sheet of a container: for each map the source, what the container decodes to, and
+// their difference.
 #pragma once
 
 #include <span>
@@ -17,9 +18,9 @@ struct RgbImage {
   std::vector<float> rgb;
 };
 
-// Collects small pictures of mip 0 while it is in memory, and lays them out once the measures are known.
-// Columns: source, decoded and difference (times kDifferenceGain) reduced to at most kTile texels a side, then source and
-// decoded texel for texel from the middle of the texture.
+// Collects small pictures of mip 0 while it is in memory, and lays them out once the measures are
+// known. Columns: source, decoded and difference (times kDifferenceGain) reduced to at most kTile
+// texels a side, then source and decoded texel for texel from the middle of the texture.
 class Preview {
  public:
   static constexpr int kTile = 192;

@@ -8,7 +8,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json Table(const metrics::PsnrTable& table) {
-  Json json{{"overall", CapPsnr(table.overall_db)}, {"mip0", CapPsnr(table.mip0_db)}, {"mean_mips", CapPsnr(table.mean_mips_db)}};
+  Json json{{"overall", CapPsnr(table.overall_db)},
+            {"mip0", CapPsnr(table.mip0_db)},
+            {"mean_mips", CapPsnr(table.mean_mips_db)}};
   json["mips"] = Json::array();
   for (const double db : table.psnr_db) json["mips"].push_back(CapPsnr(db));
   return json;
@@ -48,19 +50,23 @@ Json TrainingJson(const TrainedMaterial& model) {
                              {"psnr_mean_mips_db", CapPsnr(point.psnr_mean_mips_db)}});
   }
   auto model_psnr = [](double mip0, double mean_mips, double off_grid) {
-    return Json{{"mip0", CapPsnr(mip0)}, {"mean_mips", CapPsnr(mean_mips)}, {"off_grid", CapPsnr(off_grid)}};
+    return Json{{"mip0", CapPsnr(mip0)},
+                {"mean_mips", CapPsnr(mean_mips)},
+                {"off_grid", CapPsnr(off_grid)}};
   };
-  json["export"] = {{"float_model_psnr_db", model_psnr(model.float_psnr_mip0_db, model.float_psnr_mean_mips_db,
-                                                       model.float_psnr_off_grid_db)},
-                    {"exported_psnr_db", model_psnr(model.exported_psnr_mip0_db, model.exported_psnr_mean_mips_db,
-                                                    model.exported_psnr_off_grid_db)}};
+  json["export"] = {
+      {"float_model_psnr_db", model_psnr(model.float_psnr_mip0_db, model.float_psnr_mean_mips_db,
+                                         model.float_psnr_off_grid_db)},
+      {"exported_psnr_db", model_psnr(model.exported_psnr_mip0_db, model.exported_psnr_mean_mips_db,
+                                      model.exported_psnr_off_grid_db)}};
   return json;
 }
 
 }  // namespace
 
-std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPayload>& payloads, const JobSource& source,
-                         const Measurement& measurement, const TrainedMaterial* model) {
+std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPayload>& payloads,
+                         const JobSource& source, const Measurement& measurement,
+                         const TrainedMaterial* model) {
   Json json;
   json["version"] = 1;
   json["asset"] = manifest.asset;
@@ -72,11 +78,13 @@ std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPay
   json["height"] = manifest.source.height;
   json["inputs"] = Json::array();
   for (const MapNote& note : source.reference.notes) {
-    json["inputs"].push_back({{"file", note.file}, {"status", MapNoteKindName(note.kind)}, {"text", note.text}});
+    json["inputs"].push_back(
+        {{"file", note.file}, {"status", MapNoteKindName(note.kind)}, {"text", note.text}});
   }
   json["channels"] = Json::array();
   for (const ManifestChannel& channel : manifest.channels) {
-    Json entry{{"map", channel.map}, {"component", channel.component}, {"encoding", channel.encoding}};
+    Json entry{
+        {"map", channel.map}, {"component", channel.component}, {"encoding", channel.encoding}};
     entry["range"] = {channel.range_min, channel.range_max};
     if (channel.output < 0) entry["constant"] = channel.constant;
     json["channels"].push_back(std::move(entry));

@@ -1,5 +1,5 @@
-// report.json: what was found, what was made of it and how good it is, for people and tools that look closer than the
-// manifest. Deterministic: no times, no paths of the machine.
+// report.json: what was found, what was made of it and how good it is, for people and tools that
+// look closer than the manifest. Deterministic: no times, no paths of the machine.
 #pragma once
 
 #include <string>
@@ -12,11 +12,13 @@
 
 namespace patina {
 
-// The text of report.json. manifest: with its quality; payloads: the model's. model: null when every channel is constant.
-// Members: asset, fingerprint, inputs (every file of the folder: found, guessed or ignored, and why), channels (with ranges
-// and constants), quality (over all, per mip, per map and mip), training (samples, what stopped it, the accuracy along the
-// way, what the export to BC6H and half precision cost), bytes, warnings.
-std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPayload>& payloads, const JobSource& source,
-                         const Measurement& measurement, const TrainedMaterial* model);
+// The text of report.json. manifest: with its quality; payloads: the model's. model: null when
+// every channel is constant. Members: asset, fingerprint, inputs (every file of the folder: found,
+// guessed or ignored, and why), channels (with ranges and constants), quality (over all, per mip,
+// per map and mip), training (samples, what stopped it, the accuracy along the way, what the export
+// to BC6H and half precision cost), bytes, warnings.
+std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPayload>& payloads,
+                         const JobSource& source, const Measurement& measurement,
+                         const TrainedMaterial* model);
 
 }  // namespace patina

@@ -1,5 +1,5 @@
-// run.json: what a run cost on the machine it ran on. Lies in the container, but is not listed by its manifest, because it
-// differs from run to run.
+// run.json: what a run cost on the machine it ran on. Lies in the container, but is not listed by
+// its manifest, because it differs from run to run.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,12 @@ struct StageCost {
 struct RunRecord {
   std::string asset;
   std::string fingerprint;
-  std::string version;      // of the program
+  std::string version;  // of the program
   std::string cpu;
-  int cpus = 0;             // that the process may use
-  int threads = 0;          // that it used
-  std::string simd;         // "avx2" or "avx512"
-  double seconds = 0;       // from the start of the job to the writing of this record
+  int cpus = 0;        // that the process may use
+  int threads = 0;     // that it used
+  std::string simd;    // "avx2" or "avx512"
+  double seconds = 0;  // from the start of the job to the writing of this record
   double cpu_seconds = 0;
   uint64_t peak_memory_bytes = 0;
   double samples = 0;

@@ -10,9 +10,9 @@
 namespace patina {
 namespace {
 
-constexpr int kTiles = 3;              // octagons a side
-constexpr float kCut = 0.575f;         // distance from an octagon's centre to its diagonal sides, in tiles
-constexpr float kJoint = 0.016f;       // half the width of a joint, in tiles
+constexpr int kTiles = 3;       // octagons a side
+constexpr float kCut = 0.575f;  // distance from an octagon's centre to its diagonal sides, in tiles
+constexpr float kJoint = 0.016f;  // half the width of a joint, in tiles
 constexpr float kRootHalf = 0.70710678f;
 
 struct Rgb {
@@ -51,9 +51,9 @@ struct Surface {
 // Where a place lies in the pattern of octagons with a square between each four.
 struct Place {
   int tile_x = 0, tile_y = 0;
-  float x = 0, y = 0;            // from the centre of the tile, in tiles
-  float stone_edge = 0;          // distance to the edge of the octagon, inside positive, in tiles
-  float inlay_edge = 0;          // the same of the nearest inlay
+  float x = 0, y = 0;              // from the centre of the tile, in tiles
+  float stone_edge = 0;            // distance to the edge of the octagon, inside positive, in tiles
+  float inlay_edge = 0;            // the same of the nearest inlay
   float inlay_x = 0, inlay_y = 0;  // from the inlay's centre along its sides
   int inlay_id_x = 0, inlay_id_y = 0;
 };
@@ -87,7 +87,8 @@ Surface Joint(float u, float v, const Seeds& seeds) {
   const float lumps = TileableFbm(u, v, 36, 3, seeds[1]);
   Surface s;
   s.height = 0.20f + 0.05f * lumps + 0.025f * grain;
-  s.albedo = Scale(Mix({0.29f, 0.25f, 0.21f}, {0.40f, 0.35f, 0.29f}, 0.5f + 0.5f * lumps), 1 + 0.18f * grain);
+  s.albedo = Scale(Mix({0.29f, 0.25f, 0.21f}, {0.40f, 0.35f, 0.29f}, 0.5f + 0.5f * lumps),
+                   1 + 0.18f * grain);
   s.roughness = 0.93f + 0.04f * grain;
   return s;
 }
@@ -97,7 +98,8 @@ Surface Stone(float u, float v, const Place& p, const Seeds& seeds) {
   const int ty = p.tile_y;
   static constexpr Rgb kKinds[4] = {
       {0.46f, 0.47f, 0.50f}, {0.60f, 0.54f, 0.46f}, {0.38f, 0.41f, 0.43f}, {0.55f, 0.45f, 0.39f}};
-  const uint32_t kind = (static_cast<uint32_t>(tx + 2 * ty) + (LatticeHash(tx, ty, seeds[2]) & 1)) & 3;
+  const uint32_t kind =
+      (static_cast<uint32_t>(tx + 2 * ty) + (LatticeHash(tx, ty, seeds[2]) & 1)) & 3;
 
   const float broad = TileableFbm(u, v, 5, 4, seeds[3]);
   const float fine = TileableFbm(u, v, 40, 4, seeds[4]);
@@ -120,14 +122,17 @@ Surface Stone(float u, float v, const Place& p, const Seeds& seeds) {
   const float bevel = 1 - std::pow(1 - Clamp01(edge / 0.045f), 2.2f);
   const float wear = Smooth(0.06f, 0.35f, p.stone_edge + 0.06f * broad);
   const float lift = 0.07f * (LatticeRandom(tx, ty, seeds[9]) - 0.5f);
-  const float tilt = 0.10f * (p.x * (LatticeRandom(tx, ty, seeds[10]) - 0.5f) + p.y * (LatticeRandom(tx, ty, seeds[11]) - 0.5f));
+  const float tilt = 0.10f * (p.x * (LatticeRandom(tx, ty, seeds[10]) - 0.5f) +
+                              p.y * (LatticeRandom(tx, ty, seeds[11]) - 0.5f));
   const float pits = Smooth(0.38f, 0.62f, TileableNoise(u, v, 75, seeds[12]));
-  s.height = 0.24f + 0.40f * bevel + lift + tilt + 0.035f * broad + (0.05f - 0.03f * wear) * fine - 0.045f * pits;
+  s.height = 0.24f + 0.40f * bevel + lift + tilt + 0.035f * broad + (0.05f - 0.03f * wear) * fine -
+             0.045f * pits;
   s.roughness = Clamp01(0.80f - 0.30f * wear + 0.14f * fine + 0.12f * pits + 0.05f * speckle);
   s.albedo = Mix(Scale(s.albedo, 0.72f), s.albedo, Smooth(0.0f, 0.05f, edge));
   s.albedo = Mix(s.albedo, Scale(s.albedo, 0.62f), 0.8f * pits);
 
-  // Two nets of cracks; the coarse one runs through some tiles only, the fine one where the broad noise is low.
+  // Two nets of cracks; the coarse one runs through some tiles only, the fine one where the broad
+  // noise is low.
   const float bend_x = 0.016f * TileableFbm(u, v, 18, 3, seeds[13]);
   const float bend_y = 0.016f * TileableFbm(u, v, 18, 3, seeds[14]);
   const VoronoiHit coarse = TileableVoronoi(u + bend_x, v + bend_y, 8, seeds[15]);
@@ -146,7 +151,8 @@ Surface Stone(float u, float v, const Place& p, const Seeds& seeds) {
   // Some of the deep cracks glow.
   const float live = Smooth(0.02f, 0.22f, TileableFbm(u, v, 3, 2, seeds[18]));
   const float core = cracked * live * (1 - Smooth(0.25f * width, 1.5f * width, coarse.border));
-  const float halo = cracked * live * 0.30f * std::exp(-coarse.border / 0.065f) * Smooth(0.0f, 0.08f, p.stone_edge);
+  const float halo = cracked * live * 0.30f * std::exp(-coarse.border / 0.065f) *
+                     Smooth(0.0f, 0.08f, p.stone_edge);
   const Rgb hot{1.0f, 0.62f, 0.20f};
   const Rgb warm{0.95f, 0.30f, 0.06f};
   const float glow = Clamp01(core + halo);
@@ -167,15 +173,18 @@ Surface Inlay(float u, float v, const Place& p, const Seeds& seeds) {
   const float rim = 1 - Smooth(0.0f, 0.005f, std::fabs(p.inlay_edge - 0.016f) - 0.003f);
 
   // Verdigris gathers at the rim, in the groove and where the noise is high.
-  const float age = 0.55f * Smooth(0.022f, 0.0f, p.inlay_edge) + 0.5f * groove + 0.35f * rim - 0.35f * boss;
+  const float age =
+      0.55f * Smooth(0.022f, 0.0f, p.inlay_edge) + 0.5f * groove + 0.35f * rim - 0.35f * boss;
   const float verdigris = Smooth(0.20f, 0.55f, age + 0.95f * broad + 0.08f * scratch);
 
   Surface s;
   const float bevel = 1 - std::pow(1 - Clamp01(p.inlay_edge / 0.012f), 2.0f);
-  s.height = 0.26f + 0.36f * bevel + 0.07f * boss - 0.06f * groove - 0.04f * rim + 0.012f * scratch +
-             0.05f * verdigris * (0.4f + 0.6f * broad);
-  const Rgb brass = Scale(Mix({0.90f, 0.74f, 0.42f}, {0.78f, 0.60f, 0.33f}, 0.5f + 0.5f * broad), 1 + 0.05f * scratch);
-  const Rgb green = Mix({0.30f, 0.56f, 0.50f}, {0.46f, 0.68f, 0.58f}, 0.5f + 0.9f * TileableNoise(u, v, 120, seeds[21]));
+  s.height = 0.26f + 0.36f * bevel + 0.07f * boss - 0.06f * groove - 0.04f * rim +
+             0.012f * scratch + 0.05f * verdigris * (0.4f + 0.6f * broad);
+  const Rgb brass = Scale(Mix({0.90f, 0.74f, 0.42f}, {0.78f, 0.60f, 0.33f}, 0.5f + 0.5f * broad),
+                          1 + 0.05f * scratch);
+  const Rgb green = Mix({0.30f, 0.56f, 0.50f}, {0.46f, 0.68f, 0.58f},
+                        0.5f + 0.9f * TileableNoise(u, v, 120, seeds[21]));
   s.albedo = Mix(brass, green, verdigris);
   s.metalness = 1 - verdigris;
   s.roughness = Clamp01(Mix(0.26f + 0.10f * scratch + 0.10f * broad, 0.86f, verdigris));
@@ -188,10 +197,12 @@ void GrowMoss(float u, float v, const Place& p, const Seeds& seeds, Surface* s) 
   const float tuft = TileableFbm(u, v, 64, 3, seeds[23]);
   const float near_joint = Smooth(0.10f, -0.02f, std::max(p.stone_edge, 2.2f * p.inlay_edge));
   const float low = Smooth(0.62f, 0.22f, s->height);
-  const float cover = Smooth(0.30f, 0.55f, 0.55f * low + 0.45f * near_joint + 1.3f * where - 0.52f + 0.22f * tuft);
+  const float cover =
+      Smooth(0.30f, 0.55f, 0.55f * low + 0.45f * near_joint + 1.3f * where - 0.52f + 0.22f * tuft);
   const float live_glow = std::max({s->emissive.r, s->emissive.g, s->emissive.b});
   const float moss = cover * (1 - Smooth(0.05f, 0.3f, live_glow));
-  const Rgb colour = Mix({0.22f, 0.25f, 0.11f}, {0.45f, 0.48f, 0.22f}, Clamp01(0.5f + 0.8f * tuft + 0.3f * where));
+  const Rgb colour =
+      Mix({0.22f, 0.25f, 0.11f}, {0.45f, 0.48f, 0.22f}, Clamp01(0.5f + 0.8f * tuft + 0.3f * where));
   s->height = Mix(s->height, std::max(s->height, 0.30f) + 0.07f + 0.10f * tuft, moss);
   s->albedo = Mix(s->albedo, colour, moss);
   s->roughness = Mix(s->roughness, 0.96f, moss);
@@ -228,12 +239,14 @@ std::vector<float> BoxBlur(const std::vector<float>& in, int size, int radius, T
   std::vector<float> rows(in.size());
   std::vector<float> out(in.size());
   const float scale = 1.0f / static_cast<float>(2 * radius + 1);
-  auto pass = [&](const std::vector<float>& from, std::vector<float>& to, size_t step, size_t stride) {
+  auto pass = [&](const std::vector<float>& from, std::vector<float>& to, size_t step,
+                  size_t stride) {
     pool.ParallelFor(size, [&](int line, int) {
       const float* src = from.data() + static_cast<size_t>(line) * stride;
       float* dst = to.data() + static_cast<size_t>(line) * stride;
       double sum = 0;
-      for (int i = -radius; i <= radius; ++i) sum += src[static_cast<size_t>((i % size + size) % size) * step];
+      for (int i = -radius; i <= radius; ++i)
+        sum += src[static_cast<size_t>((i % size + size) % size) * step];
       for (int i = 0; i < size; ++i) {
         dst[static_cast<size_t>(i) * step] = static_cast<float>(sum) * scale;
         sum += src[static_cast<size_t>((i + radius + 1) % size) * step];
@@ -288,7 +301,8 @@ SampleMaterial MakeSampleMaterial(int size, uint64_t seed, ThreadPool& pool) {
     for (int x = 0; x < size; ++x) {
       const size_t i = here + x;
       const float h = m.height[i];
-      const float buried = 1.6f * std::max(0.0f, narrow[i] - h) + 1.5f * std::max(0.0f, middle[i] - h) +
+      const float buried = 1.6f * std::max(0.0f, narrow[i] - h) +
+                           1.5f * std::max(0.0f, middle[i] - h) +
                            1.1f * std::max(0.0f, wide[i] - h);
       m.arm[3 * i] = Clamp01(1 - buried);
       const float raised = std::max(0.0f, h - middle[i]);
@@ -297,7 +311,8 @@ SampleMaterial MakeSampleMaterial(int size, uint64_t seed, ThreadPool& pool) {
         float& a = m.albedo[3 * i + c];
         a = Clamp01(a * (1 - 0.35f * Clamp01(buried)) * (1 + 0.9f * std::min(raised, 0.2f)));
       }
-      const float dx = slope * (m.height[here + (x + 1) % size] - m.height[here + (x + size - 1) % size]);
+      const float dx =
+          slope * (m.height[here + (x + 1) % size] - m.height[here + (x + size - 1) % size]);
       const float dy = slope * (m.height[down + x] - m.height[up + x]);
       const float scale = 1 / std::sqrt(dx * dx + dy * dy + 1);
       // Rows run down and Y points up, so the slope along Y changes its sign twice.

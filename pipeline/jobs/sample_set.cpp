@@ -7,10 +7,12 @@
 
 namespace patina {
 
-Result<std::vector<std::string>> WriteSampleSet(const std::string& folder, int size, uint64_t seed, ThreadPool& pool) {
+Result<std::vector<std::string>> WriteSampleSet(const std::string& folder, int size, uint64_t seed,
+                                                ThreadPool& pool) {
   if (size < 1 || size > kMaxSampleSide) {
     return Fail(ErrorCode::kInvalidArgument, "the size of a sample must be between 1 and " +
-                                                 std::to_string(kMaxSampleSide) + " texels; is " + std::to_string(size));
+                                                 std::to_string(kMaxSampleSide) + " texels; is " +
+                                                 std::to_string(size));
   }
   PATINA_TRY(MakeDirectories(folder));
   const SampleMaterial material = MakeSampleMaterial(size, seed, pool);

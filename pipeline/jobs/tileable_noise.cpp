@@ -16,10 +16,10 @@ float Fade(float t) { return t * t * t * (t * (t * 6 - 15) + 10); }
 // Dot product of (dx, dy) with one of 16 directions, picked by the hash.
 float Gradient(uint32_t hash, float dx, float dy) {
   static constexpr float kDirections[16][2] = {
-      {1, 0},           {0.9239f, 0.3827f},   {0.7071f, 0.7071f},   {0.3827f, 0.9239f},
-      {0, 1},           {-0.3827f, 0.9239f},  {-0.7071f, 0.7071f},  {-0.9239f, 0.3827f},
-      {-1, 0},          {-0.9239f, -0.3827f}, {-0.7071f, -0.7071f}, {-0.3827f, -0.9239f},
-      {0, -1},          {0.3827f, -0.9239f},  {0.7071f, -0.7071f},  {0.9239f, -0.3827f}};
+      {1, 0},  {0.9239f, 0.3827f},   {0.7071f, 0.7071f},   {0.3827f, 0.9239f},
+      {0, 1},  {-0.3827f, 0.9239f},  {-0.7071f, 0.7071f},  {-0.9239f, 0.3827f},
+      {-1, 0}, {-0.9239f, -0.3827f}, {-0.7071f, -0.7071f}, {-0.3827f, -0.9239f},
+      {0, -1}, {0.3827f, -0.9239f},  {0.7071f, -0.7071f},  {0.9239f, -0.3827f}};
   const float* d = kDirections[hash & 15];
   return d[0] * dx + d[1] * dy;
 }
@@ -27,7 +27,8 @@ float Gradient(uint32_t hash, float dx, float dy) {
 }  // namespace
 
 uint32_t LatticeHash(int x, int y, uint32_t seed) {
-  uint32_t h = seed * 0x9E3779B1u + static_cast<uint32_t>(x) * 0x85EBCA77u + static_cast<uint32_t>(y) * 0xC2B2AE3Du;
+  uint32_t h = seed * 0x9E3779B1u + static_cast<uint32_t>(x) * 0x85EBCA77u +
+               static_cast<uint32_t>(y) * 0xC2B2AE3Du;
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   h = (h ^ (h >> 12)) * 0x297A2D39u;
   return h ^ (h >> 15);
@@ -71,7 +72,8 @@ float TileableFbm(float u, float v, int period, int octaves, uint32_t seed) {
   return sum / total;
 }
 
-// Based on: I. Quilez, "Voronoi - distances". The border is found in a second pass around the nearest point.
+// Based on: I. Quilez, "Voronoi - distances". The border is found in a second pass around the
+// nearest point.
 VoronoiHit TileableVoronoi(float u, float v, int period, uint32_t seed) {
   const float x = u * static_cast<float>(period);
   const float y = v * static_cast<float>(period);

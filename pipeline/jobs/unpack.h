@@ -12,7 +12,8 @@ namespace patina {
 
 enum class UnpackFormat {
   kPng,  // 8 bit for sources of 8 bit, else 16; colour sRGB-coded, data as it is
-  kExr   // half floats for sources of 8 bit and half floats, else floats; colour linear, data as it is
+  kExr   // half floats for sources of 8 bit and half floats, else floats; colour linear, data as it
+         // is
 };
 
 struct Unpacked {
@@ -20,12 +21,12 @@ struct Unpacked {
   std::vector<std::string> warnings;  // values that the format cannot hold
 };
 
-// Decodes mip `mip` of a container (see OpenContainer for `container`) and writes one image for each map into `folder`
-// (made if missing), named by role: albedo.png, normal.png, ao.png ... in the size of that mip. Normals are 0.5 + 0.5 n of
-// x, y, z, OpenGL, in both formats. Existing files of those names are replaced.
-// Errors: those of OpenContainer, VerifyPayloads and the decoder; kOutOfRange for a mip the source does not have;
-// kCancelled, kIo, kResourceExhausted.
-Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder, int mip, UnpackFormat format,
-                                 ThreadPool& pool, const CancelToken& cancel);
+// Decodes mip `mip` of a container (see OpenContainer for `container`) and writes one image for
+// each map into `folder` (made if missing), named by role: albedo.png, normal.png, ao.png ... in
+// the size of that mip. Normals are 0.5 + 0.5 n of x, y, z, OpenGL, in both formats. Existing files
+// of those names are replaced. Errors: those of OpenContainer, VerifyPayloads and the decoder;
+// kOutOfRange for a mip the source does not have; kCancelled, kIo, kResourceExhausted.
+Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder, int mip,
+                                 UnpackFormat format, ThreadPool& pool, const CancelToken& cancel);
 
 }  // namespace patina

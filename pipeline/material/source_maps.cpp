@@ -224,7 +224,8 @@ class Loader {
                        height != nullptr ? &maps_.files[height->file].image : nullptr,
                        height != nullptr ? height->channels[0] : 0, pool_);
     char number[32];
-    if (evidence.height_x > kHeightEvidence && std::fabs(evidence.height_y) > kHeightEvidence) {
+    if (height != nullptr && evidence.height_x > kHeightEvidence &&
+        std::fabs(evidence.height_y) > kHeightEvidence) {
       std::snprintf(number, sizeof number, "%.2f", evidence.height_y);
       const std::string& height_name = maps_.descriptions[height->file].file;
       if (evidence.height_y < 0) {

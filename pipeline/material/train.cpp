@@ -30,11 +30,11 @@ double CpuSeconds() {
 // Training effort in samples a texel of the whole pyramid. Quality still grows with the logarithm beyond: see the README.
 double SamplesPerTexel(Quality quality) {
   switch (quality) {
-    case Quality::kPreview: return 20;
-    case Quality::kStandard: return 150;
-    case Quality::kReference: return 1500;
+    case Quality::kPreview: return 7;
+    case Quality::kStandard: return 96;
+    case Quality::kReference: return 1200;
   }
-  return 150;
+  return 96;
 }
 
 // Small sources train fast anyway, and their network needs steps to settle.
@@ -48,11 +48,75 @@ constexpr int kCoarsePasses = 3;
 constexpr double kTuneRate = 3e-5;
 constexpr double kTuneShare = 0.02;     // of the samples, for the network after the features are frozen
 // Re-encodes during the training, as shares of it: later training then starts from legal blocks.
-constexpr double kReencodeAt[] = {0.5, 0.75, 0.9};
+constexpr double kReencodeAt[] = {0.6, 0.85};
 
 double CosineRate(double progress) {
   const double warm = std::min(1.0, progress / kWarmUp);
   return warm * 0.5 * (1 + std::cos(std::numbers::pi * std::min(1.0, progress)));
+}
+
+// How far the training is and how long it still goes. Without limits it is a plain count of samples; a time budget makes
+// progress follow the clock, a reached target or a flat slope brings the end near.
+class Schedule {
+ public:
+  Schedule(const TrainOptions& options, double budget, double reserve_s) : options_(options), end_(budget) {
+    if (options.time_budget_s > 0) train_s_ = std::max(0.2 * options.time_budget_s, options.time_budget_s - reserve_s);
+  }
+
+  double Progress(double samples, double elapsed_s) {
+    const double by_samples = samples / end_;
+    if (train_s_ > 0 && elapsed_s / train_s_ > by_samples) {
+      stopped_by_ = "time";
+      progress_ = std::max(progress_, elapsed_s / train_s_);
+    } else {
+      progress_ = std::max(progress_, by_samples);
+    }
+    return progress_;
+  }
+
+  // At checkpoints: the quality so far. Ends early with what is left of the falling rates.
+  void Observe(double samples, double psnr_mip0_db) {
+    if (ending_) return;
+    if (options_.target_psnr_db > 0 && psnr_mip0_db >= options_.target_psnr_db + kTargetMarginDb) {
+      End(samples, "target");
+    } else if (options_.quality == Quality::kReference && options_.samples == 0 && last_samples_ > 0) {
+      const double doublings = std::log2(samples / last_samples_);
+      if (doublings > 0.4 && (psnr_mip0_db - last_psnr_db_) / doublings < kFlatDb) End(samples, "slope");
+    }
+    last_samples_ = samples;
+    last_psnr_db_ = psnr_mip0_db;
+  }
+
+  const char* stopped_by() const { return stopped_by_; }
+
+ private:
+  // Gain of mip 0 in dB for twice the samples below which more of them do not pay, and what the export may lose of a target.
+  static constexpr double kFlatDb = 0.03;
+  static constexpr double kTargetMarginDb = 0.1;
+  static constexpr double kEndingFrom = 0.8;  // the last fifth of the cosine: where most of the noise settles
+
+  void End(double samples, const char* why) {
+    ending_ = true;
+    end_ = std::min(end_, samples / kEndingFrom);
+    stopped_by_ = why;
+  }
+
+  const TrainOptions& options_;
+  double end_;
+  double train_s_ = 0;
+  double progress_ = 0;
+  bool ending_ = false;
+  double last_samples_ = 0, last_psnr_db_ = 0;
+  const char* stopped_by_ = "budget";
+};
+
+// Seconds that the export will take: a block costs about 50 microseconds of one core in all passes.
+double ExportSeconds(const FeatureStore& store, int threads) {
+  double blocks = 0;
+  for (const auto& texture : store.textures) {
+    for (const FeatureLevel& level : texture) blocks += level.block_count();
+  }
+  return 5e-5 * blocks / threads;
 }
 
 AdamRates FeatureRates(double factor) {
@@ -77,28 +141,28 @@ AdamRates NetworkRates(double rate) {
 // What both recipes share: the clock, the curve, progress, cancelling, rolling back.
 class Session {
  public:
-  Session(const TrainOptions& options, double budget, ProgressSink& progress, TrainedMaterial* result)
-      : options_(options), budget_(budget), progress_(progress), result_(result), start_(Clock::now()), start_cpu_(CpuSeconds()) {}
+  Session(const TrainOptions& options, ProgressSink& progress, TrainedMaterial* result)
+      : options_(options), progress_(progress), result_(result), start_(Clock::now()), start_cpu_(CpuSeconds()) {}
 
   bool cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
   double seconds() const { return SecondsSince(start_); }
 
   // Reports at most a few times a second.
-  void Report(Trainer* trainer) {
+  void Report(Trainer* trainer, double fraction) {
     if (SecondsSince(last_report_) < 0.2) return;
     last_report_ = Clock::now();
     ProgressEvent event;
     event.stage = "train";
     event.samples = trainer->samples();
-    event.fraction = std::min(1.0, trainer->samples() / budget_);
+    event.fraction = std::min(1.0, fraction);
     event.elapsed_s = seconds();
     event.samples_per_s = event.samples / std::max(1e-3, event.elapsed_s);
-    event.eta_s = (budget_ - event.samples) / std::max(1.0, event.samples_per_s);
+    event.eta_s = event.fraction > 0.01 ? event.elapsed_s * (1 - event.fraction) / event.fraction : -1;
     event.psnr_db = PsnrOfMse(trainer->TakeRunningError());
     progress_.OnProgress(event);
   }
 
-  void Record(Trainer* trainer, FeatureStore* store, const float* network) {
+  double Record(Trainer* trainer, FeatureStore* store, const float* network) {
     const ModelError error = trainer->Evaluate(store, network, 0);
     CurvePoint point;
     point.samples = trainer->samples();
@@ -107,11 +171,11 @@ class Session {
     point.psnr_mip0_db = error.MipPsnr(0);
     point.psnr_mean_mips_db = error.MeanMipsPsnr();
     result_->curve.push_back(point);
+    return point.psnr_mip0_db;
   }
 
  private:
   const TrainOptions& options_;
-  double budget_;
   ProgressSink& progress_;
   TrainedMaterial* result_;
   Clock::time_point start_;
@@ -189,12 +253,16 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
   session->Record(&trainer, &store, network.raw());
   network.Save();
   size_t next_reencode = 0;
-  double next_record = 1.0 / 16;
+  // Checkpoints at twice the samples each, and more often where a target waits for them.
+  const double checkpoint_growth = options.target_psnr_db > 0 || options.quality == Quality::kReference ? std::numbers::sqrt2 : 2;
+  const bool quick = options.quality == Quality::kPreview;
+  double next_record = quick ? 0.5 : 1.0 / 16;
   double guard = 1;  // lowers all rates after a step that had to be undone
   int steps = 0;
-  result->stopped_by = "budget";
-  while (trainer.samples() < budget && !session->cancelled()) {
-    const double progress = trainer.samples() / budget;
+  Schedule schedule(options, budget, ExportSeconds(store, pool.threads()));
+  while (!session->cancelled()) {
+    const double progress = schedule.Progress(trainer.samples(), session->seconds());
+    if (progress >= 1) break;
     const double factor = guard * CosineRate(progress);
     if (trainer.Step(FeatureRates(factor), NetworkRates(kNetworkRate * factor), false)) {
       if (++steps % 64 == 0) network.Save();
@@ -202,24 +270,25 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
       ++result->rollbacks;
       guard *= 0.5;
     }
-    if (next_reencode < std::size(kReencodeAt) && progress >= kReencodeAt[next_reencode]) {
+    if (!quick && next_reencode < std::size(kReencodeAt) && progress >= kReencodeAt[next_reencode]) {
       ++next_reencode;
       exporter.Encode();
     }
     if (progress >= next_record) {
-      session->Record(&trainer, &store, network.raw());
-      next_record *= 2;
+      schedule.Observe(trainer.samples(), session->Record(&trainer, &store, network.raw()));
+      next_record *= checkpoint_growth;
     }
-    session->Report(&trainer);
+    session->Report(&trainer, progress);
   }
   if (session->cancelled()) return;
   session->Record(&trainer, &store, network.raw());
+  result->stopped_by = schedule.stopped_by();
   result->samples = trainer.samples();
   KeepFloatQuality(&trainer, &store, network.raw(), result);
   exporter.Encode();
-  exporter.Refine(0);
+  if (!quick) exporter.Refine(0);
   // Coarse levels are few and their mips exact enough to feel every code: once more costs little.
-  for (int pass = 0; pass < kCoarsePasses; ++pass) exporter.Refine(1);
+  for (int pass = 0; pass < (quick ? 1 : kCoarsePasses); ++pass) exporter.Refine(1);
   FinishNetwork(reference, kernels, pool, options, draw, kDefaultWindowsPerStep, kTuneShare * budget, kTuneRate, &exporter, &network, result);
 }
 
@@ -250,7 +319,7 @@ void TrainPaper(const MaterialReference& reference, const MaterialKernels& kerne
     while (trainer->samples() < samples && !session->cancelled()) {
       const double factor = std::exp(-fall * trainer->samples() / samples);
       if (!trainer->Step(rates(feature_rate * factor), rates(network_rate * factor), true)) ++result->rollbacks;
-      session->Report(trainer);
+      session->Report(trainer, (result->samples + trainer->samples()) / budget);
     }
   };
 
@@ -304,7 +373,7 @@ Result<TrainedMaterial> TrainMaterial(const MaterialReference& reference, const 
   result.shape = shape;
   result.outputs = outputs;
   const double budget = SampleBudget(reference, options);
-  Session session(options, budget, progress, &result);
+  Session session(options, progress, &result);
   if (options.recipe == Recipe::kPaper) {
     TrainPaper(reference, KernelsFor(target), options, budget, pool, &session, &result);
   } else {

@@ -16,8 +16,8 @@
 
 namespace patina {
 
-// Windows between two network steps: about 16 thousand samples.
-inline constexpr int kDefaultWindowsPerStep = 4;
+// Windows between two network steps: about 32 thousand samples. Fewer leave threads waiting for each other.
+inline constexpr int kDefaultWindowsPerStep = 8;
 
 // How windows are drawn.
 struct WindowDraw {

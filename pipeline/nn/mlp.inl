@@ -9,16 +9,18 @@ using mlp::kChunkVectors;
 
 #if defined(PATINA_SIMD_IS_AVX512)
 inline constexpr int kVectorBlock = 4;  // sample vectors a register block holds: 4 outputs x 4 vectors
-inline constexpr int kOuterA = 4, kOuterB = 6;
 #else
 inline constexpr int kVectorBlock = 1;  // pairs of registers: 4 outputs x 1 vector
-inline constexpr int kOuterA = 2, kOuterB = 3;
 #endif
 
-// y[o] = b[o] + sum_i w[o * row_stride + i * column_stride] x[i] for kOut rows; kRelu clamps at zero.
-template <int kOut, bool kBias, bool kRelu>
+// What a dense layer does with its sums: nothing, clamp them at zero, or pass them where a gate is above zero (the ReLU's
+// derivative).
+enum class Finish { kLinear, kRelu, kGate };
+
+// y[o] = b[o] + sum_i w[o * row_stride + i * column_stride] x[i] for kOut rows. gate has y's layout.
+template <int kOut, bool kBias, Finish kFinish>
 PATINA_INLINE void DenseRows(const float* w, int row_stride, int column_stride, const float* b, int inputs,
-                             const float* x, float* y) {
+                             const float* x, const float* gate, float* y) {
   for (int v = 0; v < kChunkVectors; v += kVectorBlock) {
     F16 acc[kOut][kVectorBlock];
     Unroll<kOut>([&](auto o) PATINA_LAMBDA {
@@ -38,36 +40,40 @@ PATINA_INLINE void DenseRows(const float* w, int row_stride, int column_stride, 
     Unroll<kOut>([&](auto o) PATINA_LAMBDA {
       Unroll<kVectorBlock>([&](auto k) PATINA_LAMBDA {
         F16 value = acc[o][k];
-        if constexpr (kRelu) value = Max(Zero(), value);  // in this order NaN passes, and the loss shows it
+        if constexpr (kFinish == Finish::kGate) {
+          value = ZeroUnless(Load(gate + o * kChunkSamples + (v + k) * 16) > Zero(), value);
+        }
+        if constexpr (kFinish == Finish::kRelu) value = Max(Zero(), value);  // in this order NaN passes, and the loss shows it
         Store(y + o * kChunkSamples + (v + k) * 16, value);
       });
     });
   }
 }
 
-template <bool kBias, bool kRelu>
+template <bool kBias, Finish kFinish>
 PATINA_INLINE void Dense(const float* w, int row_stride, int column_stride, const float* b, int inputs, int outputs,
-                         const float* x, float* y) {
+                         const float* x, const float* gate, float* y) {
   int o = 0;
   const auto advance = [&](int rows) PATINA_LAMBDA {
     w += rows * row_stride;
     if (kBias) b += rows;
     y += rows * kChunkSamples;
+    if (kFinish == Finish::kGate) gate += rows * kChunkSamples;
     o += rows;
   };
   while (outputs - o >= 4) {
     if (outputs - o == 5 || outputs - o == 6 || outputs - o == 9) {
-      DenseRows<3, kBias, kRelu>(w, row_stride, column_stride, b, inputs, x, y);
+      DenseRows<3, kBias, kFinish>(w, row_stride, column_stride, b, inputs, x, gate, y);
       advance(3);
     } else {
-      DenseRows<4, kBias, kRelu>(w, row_stride, column_stride, b, inputs, x, y);
+      DenseRows<4, kBias, kFinish>(w, row_stride, column_stride, b, inputs, x, gate, y);
       advance(4);
     }
   }
   switch (outputs - o) {
-    case 3: DenseRows<3, kBias, kRelu>(w, row_stride, column_stride, b, inputs, x, y); break;
-    case 2: DenseRows<2, kBias, kRelu>(w, row_stride, column_stride, b, inputs, x, y); break;
-    case 1: DenseRows<1, kBias, kRelu>(w, row_stride, column_stride, b, inputs, x, y); break;
+    case 3: DenseRows<3, kBias, kFinish>(w, row_stride, column_stride, b, inputs, x, gate, y); break;
+    case 2: DenseRows<2, kBias, kFinish>(w, row_stride, column_stride, b, inputs, x, gate, y); break;
+    case 1: DenseRows<1, kBias, kFinish>(w, row_stride, column_stride, b, inputs, x, gate, y); break;
     default: break;
   }
 }
@@ -78,11 +84,11 @@ PATINA_INLINE void OuterTile(const float* left, const float* right, float* lanes
   F16 acc[kA][kB];
   Unroll<kA>([&](auto a) PATINA_LAMBDA { Unroll<kB>([&](auto b) PATINA_LAMBDA { acc[a][b] = Zero(); }); });
   for (int v = 0; v < kChunkVectors; ++v) {
-    F16 r[kB];
-    Unroll<kB>([&](auto b) PATINA_LAMBDA { r[b] = Load(right + b * kChunkSamples + v * 16); });
-    Unroll<kA>([&](auto a) PATINA_LAMBDA {
-      const F16 l = Load(left + a * kChunkSamples + v * 16);
-      Unroll<kB>([&](auto b) PATINA_LAMBDA { acc[a][b] = MulAdd(l, r[b], acc[a][b]); });
+    F16 l[kA];
+    Unroll<kA>([&](auto a) PATINA_LAMBDA { l[a] = Load(left + a * kChunkSamples + v * 16); });
+    Unroll<kB>([&](auto b) PATINA_LAMBDA {
+      const F16 r = Load(right + b * kChunkSamples + v * 16);
+      Unroll<kA>([&](auto a) PATINA_LAMBDA { acc[a][b] = MulAdd(l[a], r, acc[a][b]); });
     });
   }
   Unroll<kA>([&](auto a) PATINA_LAMBDA {
@@ -93,25 +99,48 @@ PATINA_INLINE void OuterTile(const float* left, const float* right, float* lanes
   });
 }
 
-template <int kA>
+template <int kA, int kB>
 PATINA_INLINE void OuterRow(const float* left, const float* right, float* lanes, int right_count) {
   int b = 0;
-  for (; b + kOuterB <= right_count; b += kOuterB) {
-    OuterTile<kA, kOuterB>(left, right + b * kChunkSamples, lanes + b * 16, right_count);
-  }
-  for (; b + 2 <= right_count; b += 2) OuterTile<kA, 2>(left, right + b * kChunkSamples, lanes + b * 16, right_count);
+  for (; b + kB <= right_count; b += kB) OuterTile<kA, kB>(left, right + b * kChunkSamples, lanes + b * 16, right_count);
   for (; b < right_count; ++b) OuterTile<kA, 1>(left, right + b * kChunkSamples, lanes + b * 16, right_count);
 }
 
-// Weight gradients: lanes[a][b] += sum of left[a] * right[b] over the chunk.
+// Weight gradients: lanes[a][b] += sum of left[a] * right[b] over the chunk; right_count is 12 or 16. Tiles are as large as the
+// registers hold.
 PATINA_STAGE void Outer(const float* left, int left_count, const float* right, int right_count, float* lanes) {
   int a = 0;
-  for (; a + kOuterA <= left_count; a += kOuterA) {
-    OuterRow<kOuterA>(left + a * kChunkSamples, right, lanes + a * right_count * 16, right_count);
+  const auto at = [&](auto rows, auto columns) PATINA_LAMBDA {
+    OuterRow<rows, columns>(left + a * kChunkSamples, right, lanes + a * right_count * 16, right_count);
+    a += rows;
+  };
+  using std::integral_constant;
+#if defined(PATINA_SIMD_IS_AVX512)
+  while (left_count - a >= 4 && left_count - a != 5 && left_count - a != 6 && left_count - a != 9) {
+    if (right_count % 6 == 0) {
+      at(integral_constant<int, 4>{}, integral_constant<int, 6>{});
+    } else {
+      at(integral_constant<int, 4>{}, integral_constant<int, 4>{});
+    }
   }
-  for (; a < left_count; ++a) {
-    OuterRow<1>(left + a * kChunkSamples, right, lanes + a * right_count * 16, right_count);
+  while (left_count - a >= 3) {
+    if (right_count % 8 == 0) {
+      at(integral_constant<int, 3>{}, integral_constant<int, 8>{});
+    } else {
+      at(integral_constant<int, 3>{}, integral_constant<int, 6>{});
+    }
   }
+  while (left_count - a >= 1) at(integral_constant<int, 1>{}, integral_constant<int, 4>{});
+#else
+  while (left_count - a >= 2) {
+    if (right_count % 3 == 0) {
+      at(integral_constant<int, 2>{}, integral_constant<int, 3>{});
+    } else {
+      at(integral_constant<int, 2>{}, integral_constant<int, 2>{});
+    }
+  }
+  while (left_count - a >= 1) at(integral_constant<int, 1>{}, integral_constant<int, 4>{});
+#endif
 }
 
 // lanes[a] += sum over the chunk of values[a].
@@ -124,18 +153,16 @@ PATINA_INLINE void BiasGradient(const float* values, int count, float* lanes) {
 }
 
 PATINA_STAGE void MlpForward(const float* params, int outputs, mlp::Chunk* chunk) {
-  Dense<true, true>(params + mlp::kW1, mlp::kInputs, 1, params + mlp::kB1, mlp::kInputs, mlp::kHidden, chunk->x, chunk->h);
-  Dense<true, false>(params + mlp::kW2, mlp::kHidden, 1, params + mlp::OffsetB2(outputs), mlp::kHidden, outputs, chunk->h,
-                     chunk->y);
+  Dense<true, Finish::kRelu>(params + mlp::kW1, mlp::kInputs, 1, params + mlp::kB1, mlp::kInputs, mlp::kHidden, chunk->x,
+                             nullptr, chunk->h);
+  Dense<true, Finish::kLinear>(params + mlp::kW2, mlp::kHidden, 1, params + mlp::OffsetB2(outputs), mlp::kHidden, outputs,
+                               chunk->h, nullptr, chunk->y);
 }
 
 // chunk->y holds dLoss/dy on entry. Adds the weight gradients to `lanes` and writes dLoss/dx to dx [12][8][16].
 PATINA_STAGE void MlpBackward(const float* params, int outputs, mlp::Chunk* chunk, float* dx, float* lanes) {
-  Dense<false, false>(params + mlp::kW2, 1, mlp::kHidden, nullptr, outputs, mlp::kHidden, chunk->y, chunk->d);
-  for (int k = 0; k < mlp::kHidden * kChunkVectors; ++k) {
-    Store(chunk->d + k * 16, ZeroUnless(Load(chunk->h + k * 16) > Zero(), Load(chunk->d + k * 16)));
-  }
-  Dense<false, false>(params + mlp::kW1, 1, mlp::kInputs, nullptr, mlp::kHidden, mlp::kInputs, chunk->d, dx);
+  Dense<false, Finish::kGate>(params + mlp::kW2, 1, mlp::kHidden, nullptr, outputs, mlp::kHidden, chunk->y, chunk->h, chunk->d);
+  Dense<false, Finish::kLinear>(params + mlp::kW1, 1, mlp::kInputs, nullptr, mlp::kHidden, mlp::kInputs, chunk->d, nullptr, dx);
   Outer(chunk->d, mlp::kHidden, chunk->x, mlp::kInputs, lanes + mlp::kW1 * 16);
   BiasGradient(chunk->d, mlp::kHidden, lanes + mlp::kB1 * 16);
   Outer(chunk->y, outputs, chunk->h, mlp::kHidden, lanes + mlp::kW2 * 16);

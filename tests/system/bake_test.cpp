@@ -30,7 +30,8 @@ using testing_support::TempFolder;
 using Json = nlohmann::json;
 
 void MakeSample(const std::string& folder, int size = 64) {
-  const Outcome made = Patina({"sample", "--out", folder, "--size", std::to_string(size), "--quiet"});
+  const Outcome made =
+      Patina({"sample", "--out", folder, "--size", std::to_string(size), "--quiet"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
 }
 
@@ -64,25 +65,28 @@ bool HasStaging(const std::string& folder) {
 TEST(Bake, MakesAContainerAndSaysSoInJson) {
   TempFolder folder;
   MakeSample(folder / "floor");
-  const Outcome baked = Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--json"}));
+  const Outcome baked =
+      Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--json"}));
   ASSERT_EQ(baked.exit_code, 0) << baked.err;
   const Json json = LastLine(baked.out);
   const Status status = CheckAgainstSchema("result", json);
   EXPECT_TRUE(status) << status.error().message;
-  for (const char* key : {"asset", "container", "profile", "seconds", "cpu_seconds", "samples", "bytes", "psnr", "ssim", "flip"}) {
+  for (const char* key : {"asset", "container", "profile", "seconds", "cpu_seconds", "samples",
+                          "bytes", "psnr", "ssim", "flip"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
   EXPECT_EQ(json["asset"], "floor");
   EXPECT_EQ(json["profile"], "bcf-1k");
   EXPECT_GT(json["psnr"]["overall"], 20);
   EXPECT_GT(json["psnr"]["mean_mips"], json["psnr"]["mip0"]);
-  for (const char* map : {"albedo", "normal", "ao", "roughness", "metalness", "displacement", "emissive"}) {
+  for (const char* map :
+       {"albedo", "normal", "ao", "roughness", "metalness", "displacement", "emissive"}) {
     EXPECT_TRUE(json["psnr"]["maps"].contains(map)) << map;
   }
   const std::string container = json["container"];
   EXPECT_TRUE(fs::equivalent(container, folder / "out/floor/current"));
-  for (const char* file : {"manifest.json", "features_0.dds", "features_3.dds", "decoder.weights", "preview.png",
-                           "report.json", "run.json"}) {
+  for (const char* file : {"manifest.json", "features_0.dds", "features_3.dds", "decoder.weights",
+                           "preview.png", "report.json", "run.json"}) {
     EXPECT_TRUE(fs::is_regular_file(container + "/" + file)) << file;
   }
   EXPECT_FALSE(HasStaging(folder / "out"));
@@ -97,12 +101,14 @@ TEST(Bake, MakesAContainerAndSaysSoInJson) {
 TEST(Bake, IsTheSameToTheByteForAnyThreadCountAndInstructionSet) {
   TempFolder folder;
   MakeSample(folder / "floor");
-  std::vector<std::vector<std::string>> variants = {{"--threads", "1"}, {"--threads", "2"}, {"--threads", "3"}, {"--simd", "avx2"}};
+  std::vector<std::vector<std::string>> variants = {
+      {"--threads", "1"}, {"--threads", "2"}, {"--threads", "3"}, {"--simd", "avx2"}};
   if (SimdTargetSupported(SimdTarget::kAvx512)) variants.push_back({"--simd", "avx512"});
   std::vector<std::pair<std::string, std::string>> first;
   for (size_t i = 0; i < variants.size(); ++i) {
     const std::string out = folder / ("out" + std::to_string(i));
-    std::vector<std::string> arguments = Preview({"bake", folder / "floor", "--out", out, "--quiet"});
+    std::vector<std::string> arguments =
+        Preview({"bake", folder / "floor", "--out", out, "--quiet"});
     arguments.insert(arguments.end(), variants[i].begin(), variants[i].end());
     const Outcome baked = Patina(arguments);
     ASSERT_EQ(baked.exit_code, 0) << baked.err;
@@ -112,7 +118,8 @@ TEST(Bake, IsTheSameToTheByteForAnyThreadCountAndInstructionSet) {
     ASSERT_EQ(files.size(), first.size());
     for (size_t f = 0; f < files.size(); ++f) {
       EXPECT_EQ(files[f].first, first[f].first);
-      EXPECT_TRUE(files[f].second == first[f].second) << files[f].first << " differs with " << variants[i][0] << " " << variants[i][1];
+      EXPECT_TRUE(files[f].second == first[f].second)
+          << files[f].first << " differs with " << variants[i][0] << " " << variants[i][1];
     }
   }
 }
@@ -121,11 +128,13 @@ TEST(Bake, GoesOnAfterAnAssetThatFails) {
   TempFolder folder;
   MakeSample(folder / "library/a_good", 32);
   fs::create_directories(folder / "library/b_bad");
-  fs::copy_file(folder / "library/a_good/mosaic_floor_arm.png", folder / "library/b_bad/broken_albedo.png");
+  fs::copy_file(folder / "library/a_good/mosaic_floor_arm.png",
+                folder / "library/b_bad/broken_albedo.png");
   fs::resize_file(folder / "library/b_bad/broken_albedo.png", 200);
   MakeSample(folder / "library/c_good", 32);
   fs::create_directories(folder / "library/d_no_images");
-  const Outcome baked = Patina(Preview({"bake", folder / "library", "--out", folder / "out", "--json"}));
+  const Outcome baked =
+      Patina(Preview({"bake", folder / "library", "--out", folder / "out", "--json"}));
   EXPECT_EQ(baked.exit_code, 3);
   EXPECT_THAT(baked.err, HasSubstr("broken_albedo.png"));
   EXPECT_THAT(baked.err, HasSubstr("2 of 3 assets baked"));
@@ -145,7 +154,8 @@ TEST(Bake, KeepsTwoInputsOfOneNameApart) {
   TempFolder folder;
   MakeSample(folder / "x/floor", 16);
   MakeSample(folder / "y/floor", 16);
-  const Outcome baked = Patina(Preview({"bake", folder / "x/floor", folder / "y/floor", "--out", folder / "out"}));
+  const Outcome baked =
+      Patina(Preview({"bake", folder / "x/floor", folder / "y/floor", "--out", folder / "out"}));
   EXPECT_EQ(baked.exit_code, 3);
   EXPECT_THAT(baked.err, HasSubstr("also named floor"));
   EXPECT_TRUE(fs::exists(folder / "out/floor/r0001"));
@@ -155,10 +165,11 @@ TEST(Bake, KeepsTwoInputsOfOneNameApart) {
 TEST(Bake, TakesAnExplicitListOfMaps) {
   TempFolder folder;
   MakeSample(folder / "floor", 32);
-  Write(folder / "maps.json", R"([{"role": "albedo", "file": "floor/mosaic_floor_basecolor.png"},
-                                  {"role": "roughness", "file": "floor/mosaic_floor_height.png", "invert": true}])");
-  const Outcome baked =
-      Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--maps", folder / "maps.json", "--json"}));
+  Write(folder / "maps.json", R"([
+    {"role": "albedo", "file": "floor/mosaic_floor_basecolor.png"},
+    {"role": "roughness", "file": "floor/mosaic_floor_height.png", "invert": true}])");
+  const Outcome baked = Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--maps",
+                                        folder / "maps.json", "--json"}));
   ASSERT_EQ(baked.exit_code, 0) << baked.err;
   const Json maps = LastLine(baked.out)["psnr"]["maps"];
   EXPECT_EQ(maps.size(), 2u);
@@ -169,8 +180,10 @@ TEST(Bake, PublishesConstantMapsAsNumbers) {
   TempFolder folder;
   const std::vector<float> grey(16 * 16 * 3, 0.5f);
   fs::create_directories(folder / "plain");
-  ASSERT_TRUE(WriteImage(folder / "plain/plain_basecolor.png", WriteFormat::kPng8, 16, 16, 3, grey.data()));
-  const Outcome baked = Patina(Preview({"bake", folder / "plain", "--out", folder / "out", "--json"}));
+  ASSERT_TRUE(
+      WriteImage(folder / "plain/plain_basecolor.png", WriteFormat::kPng8, 16, 16, 3, grey.data()));
+  const Outcome baked =
+      Patina(Preview({"bake", folder / "plain", "--out", folder / "out", "--json"}));
   ASSERT_EQ(baked.exit_code, 0) << baked.err;
   const Json json = LastLine(baked.out);
   EXPECT_EQ(json["bytes"], 0);
@@ -188,10 +201,18 @@ TEST(Bake, PublishesConstantMapsAsNumbers) {
 TEST(Usage, ExitsWithTwo) {
   TempFolder folder;
   for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"bake"}, {"bake", "x", "--colour"}, {"bake", "x", "--out", "o", "--profile", "huge"},
-        {"bake", "x", "--out", "o", "--seed", "-1"}, {"bake", "x", "--out", "o", "--min-psnr", "1000"}, {"frobnicate"},
-        {"run"}, {"unpack", "x"}, {"sample", "--out", folder / "s", "--size", "0"}, {"help", "frobnicate"},
-        {"bake", "x", "y", "--out", "o", "--maps", "m.json"}, {"unpack", "x", "--out", "o", "--format", "bmp"}}) {
+       {std::vector<std::string>{"bake"},
+        {"bake", "x", "--colour"},
+        {"bake", "x", "--out", "o", "--profile", "huge"},
+        {"bake", "x", "--out", "o", "--seed", "-1"},
+        {"bake", "x", "--out", "o", "--min-psnr", "1000"},
+        {"frobnicate"},
+        {"run"},
+        {"unpack", "x"},
+        {"sample", "--out", folder / "s", "--size", "0"},
+        {"help", "frobnicate"},
+        {"bake", "x", "y", "--out", "o", "--maps", "m.json"},
+        {"unpack", "x", "--out", "o", "--format", "bmp"}}) {
     const Outcome outcome = Patina(arguments);
     EXPECT_EQ(outcome.exit_code, 2) << arguments[0] << ": " << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("patina: error: "));
@@ -200,8 +221,12 @@ TEST(Usage, ExitsWithTwo) {
 }
 
 TEST(Usage, HelpsOnStandardOutput) {
-  for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{}, {"--help"}, {"help"}, {"bake", "--help"}, {"help", "bake"}, {"unpack", "-h"}}) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
+                                                    {"--help"},
+                                                    {"help"},
+                                                    {"bake", "--help"},
+                                                    {"help", "bake"},
+                                                    {"unpack", "-h"}}) {
     const Outcome outcome = Patina(arguments);
     EXPECT_EQ(outcome.exit_code, 0);
     EXPECT_THAT(outcome.out, HasSubstr("Example"));
@@ -263,20 +288,23 @@ TEST(BadInput, RefusesNonFiniteTexelsUnlessToldToRepairThem) {
   std::vector<float> values(32 * 32 * 3);
   for (size_t i = 0; i < values.size(); ++i) values[i] = 0.01f * static_cast<float>(i % 97);
   values[3 * (32 * 5 + 7)] = std::numeric_limits<float>::quiet_NaN();
-  ASSERT_TRUE(WriteImage(folder / "hdr/hdr_basecolor.exr", WriteFormat::kExrFloat, 32, 32, 3, values.data()));
+  ASSERT_TRUE(WriteImage(folder / "hdr/hdr_basecolor.exr", WriteFormat::kExrFloat, 32, 32, 3,
+                         values.data()));
   const Outcome refused = Patina(Preview({"bake", folder / "hdr", "--out", folder / "out"}));
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.err, HasSubstr("hdr_basecolor.exr"));
   EXPECT_THAT(refused.err, HasSubstr("--repair-nonfinite"));
   EXPECT_FALSE(fs::exists(folder / "out/hdr"));
-  const Outcome repaired = Patina(Preview({"bake", folder / "hdr", "--out", folder / "out", "--repair-nonfinite"}));
+  const Outcome repaired =
+      Patina(Preview({"bake", folder / "hdr", "--out", folder / "out", "--repair-nonfinite"}));
   EXPECT_EQ(repaired.exit_code, 0) << repaired.err;
 }
 
 TEST(BadInput, InfoUnpackAndCompareRefuseADamagedContainer) {
   TempFolder folder;
   MakeSample(folder / "floor", 32);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code, 0);
+  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code,
+            0);
   EXPECT_EQ(Patina({"info", folder / "nowhere"}).exit_code, 3);
   const std::string features = folder / "out/floor/current/features_1.dds";
   std::string bytes = ReadAll(features);
@@ -297,7 +325,8 @@ TEST(Publish, AnUnwritableOutputFailsBeforeTheWork) {
   TempFolder folder;
   MakeSample(folder / "floor", 16);
   Write(folder / "file", "not a folder");
-  const Outcome outcome = Patina({"bake", folder / "floor", "--out", folder / "file/out", "--quality", "reference"});
+  const Outcome outcome =
+      Patina({"bake", folder / "floor", "--out", folder / "file/out", "--quality", "reference"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.err, HasSubstr(folder / "file"));
 }
@@ -305,11 +334,13 @@ TEST(Publish, AnUnwritableOutputFailsBeforeTheWork) {
 TEST(Publish, AWriteThatFailsLeavesTheEarlierContainer) {
   TempFolder folder;
   MakeSample(folder / "floor", 64);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code, 0);
+  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code,
+            0);
   const auto before = Snapshot(folder / "out");
   for (const uint64_t limit : {100u, 2000u, 20000u}) {
     const Outcome outcome =
-        Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--seed", "2"}), {.max_file_bytes = limit});
+        Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--seed", "2"}),
+               {.max_file_bytes = limit});
     EXPECT_EQ(outcome.exit_code, 1) << limit << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("patina: error: floor: ")) << limit;
     EXPECT_TRUE(Snapshot(folder / "out") == before) << limit;
@@ -319,11 +350,12 @@ TEST(Publish, AWriteThatFailsLeavesTheEarlierContainer) {
 TEST(Publish, TheQualityGateKeepsTheEarlierContainer) {
   TempFolder folder;
   MakeSample(folder / "floor", 32);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code, 0);
+  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code,
+            0);
   const auto before = Snapshot(folder / "out/floor/r0001");
   for (int round = 0; round < 2; ++round) {
-    const Outcome outcome =
-        Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--min-psnr", "90", "--json"}));
+    const Outcome outcome = Patina(
+        Preview({"bake", folder / "floor", "--out", folder / "out", "--min-psnr", "90", "--json"}));
     EXPECT_EQ(outcome.exit_code, 4);
     EXPECT_THAT(outcome.err, HasSubstr("below the gate of 90.00 dB"));
     const Json json = LastLine(outcome.out);
@@ -347,7 +379,8 @@ TEST(Run, WritesEventsAndAResult) {
   Json job = Json::parse(ReadAll(folder / "floor/job.json"));
   job["quality"] = "preview";
   Write(folder / "floor/job.json", job.dump());
-  const Outcome outcome = Patina({"run", folder / "floor/job.json", "--events", folder / "events.ndjson", "-q"});
+  const Outcome outcome =
+      Patina({"run", folder / "floor/job.json", "--events", folder / "events.ndjson", "-q"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_TRUE(fs::exists(folder / "floor/baked/mosaic_floor/current/manifest.json"));
   const Json result = Json::parse(ReadAll(folder / "result.json"));
@@ -365,7 +398,8 @@ TEST(Run, WritesEventsAndAResult) {
     if (last["type"] == "stage_started") started.push_back(last["stage"]);
     if (last["type"] == "stage_finished") finished.push_back(last["stage"]);
   }
-  EXPECT_EQ(started, (std::vector<std::string>{"ingest", "reference", "train", "package", "verify", "report", "publish"}));
+  EXPECT_EQ(started, (std::vector<std::string>{"ingest", "reference", "train", "package", "verify",
+                                               "report", "publish"}));
   EXPECT_EQ(finished, started);
   EXPECT_EQ(last["type"], "result");
   EXPECT_EQ(last["result"], result);
@@ -374,8 +408,8 @@ TEST(Run, WritesEventsAndAResult) {
 TEST(Run, WritesAResultForAJobThatCannotBeRead) {
   TempFolder folder;
   Write(folder / "job.json", "{}");
-  const Outcome outcome =
-      Patina({"run", folder / "job.json", "--events", folder / "events.ndjson", "--result", folder / "r.json"});
+  const Outcome outcome = Patina({"run", folder / "job.json", "--events", folder / "events.ndjson",
+                                  "--result", folder / "r.json"});
   EXPECT_EQ(outcome.exit_code, 3);
   const Json result = Json::parse(ReadAll(folder / "r.json"));
   EXPECT_TRUE(CheckAgainstSchema("result", result));
@@ -399,7 +433,8 @@ TEST(Run, AnInterruptPublishesNothing) {
   const std::string pipe = folder / "events";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   for (const int signal : {SIGINT, SIGTERM}) {
-    Child child({"run", folder / "floor/job.json", "--events", pipe, "-q"});
+    Child child({"run", folder / "floor/job.json", "--events", pipe, "--result",
+                 folder / "result.json", "-q"});
     std::ifstream events(pipe);
     std::string line;
     Json last;
@@ -439,7 +474,8 @@ TEST(Run, ASecondBakeOfTheSameAssetIsRefusedWhileTheFirstRuns) {
     const Json event = Json::parse(line);
     if (!tried && event["type"] == "stage_started" && event["stage"] == "train") {
       tried = true;
-      const Outcome second = Patina({"run", folder / "floor/job.json", "--result", folder / "second.json"});
+      const Outcome second =
+          Patina({"run", folder / "floor/job.json", "--result", folder / "second.json"});
       EXPECT_EQ(second.exit_code, 1);
       EXPECT_THAT(second.err, HasSubstr("another bake"));
       child.Signal(SIGINT);
@@ -454,18 +490,26 @@ TEST(Run, ASecondBakeOfTheSameAssetIsRefusedWhileTheFirstRuns) {
 TEST(Unpack, GivesMapsThatTheContainerAgreesWith) {
   TempFolder folder;
   MakeSample(folder / "floor", 64);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q", "--no-toksvig"})).exit_code, 0);
+  ASSERT_EQ(
+      Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q", "--no-toksvig"}))
+          .exit_code,
+      0);
   for (const char* format : {"png", "exr"}) {
     const std::string maps = folder / (std::string("maps_") + format);
-    const Outcome unpacked = Patina({"unpack", folder / "out/floor", "--out", maps, "--format", format});
+    const Outcome unpacked =
+        Patina({"unpack", folder / "out/floor", "--out", maps, "--format", format});
     ASSERT_EQ(unpacked.exit_code, 0) << unpacked.err;
-    for (const char* role : {"albedo", "normal", "ao", "roughness", "metalness", "displacement", "emissive"}) {
+    for (const char* role :
+         {"albedo", "normal", "ao", "roughness", "metalness", "displacement", "emissive"}) {
       const std::string path = maps + "/" + role + "." + format;
       EXPECT_THAT(unpacked.out, HasSubstr(path));
       auto info = ReadImageInfo(path);
       ASSERT_TRUE(info) << path;
       EXPECT_EQ(info->width, 64);
-      EXPECT_EQ(info->channels, std::string(role) == "albedo" || std::string(role) == "normal" || std::string(role) == "emissive" ? 3 : 1);
+      EXPECT_EQ(info->channels, std::string(role) == "albedo" || std::string(role) == "normal" ||
+                                        std::string(role) == "emissive"
+                                    ? 3
+                                    : 1);
       if (std::string(format) == "png") {
         const bool wide = std::string(role) == "normal" || std::string(role) == "displacement";
         EXPECT_EQ(info->type, wide ? SampleType::kUint16 : SampleType::kUint8) << role;
@@ -473,7 +517,8 @@ TEST(Unpack, GivesMapsThatTheContainerAgreesWith) {
     }
   }
   // Only the rounding to 8 bits lies between the container and its own maps.
-  const Outcome compared = Patina({"compare", folder / "out/floor", folder / "maps_png", "--json", "-q"});
+  const Outcome compared =
+      Patina({"compare", folder / "out/floor", folder / "maps_png", "--json", "-q"});
   ASSERT_EQ(compared.exit_code, 0) << compared.err;
   const Json json = LastLine(compared.out);
   EXPECT_GT(json["psnr"]["mip0"], 55) << json;
@@ -485,12 +530,16 @@ TEST(Unpack, GivesMapsThatTheContainerAgreesWith) {
 TEST(Unpack, KnowsTheMipsThereAre) {
   TempFolder folder;
   MakeSample(folder / "floor", 32);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code, 0);
-  ASSERT_EQ(Patina({"unpack", folder / "out/floor", "--out", folder / "maps", "--mip", "5"}).exit_code, 0);
+  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code,
+            0);
+  ASSERT_EQ(
+      Patina({"unpack", folder / "out/floor", "--out", folder / "maps", "--mip", "5"}).exit_code,
+      0);
   auto info = ReadImageInfo(folder / "maps/albedo.png");
   ASSERT_TRUE(info);
   EXPECT_EQ(info->width, 1);
-  const Outcome beyond = Patina({"unpack", folder / "out/floor", "--out", folder / "maps", "--mip", "6"});
+  const Outcome beyond =
+      Patina({"unpack", folder / "out/floor", "--out", folder / "maps", "--mip", "6"});
   EXPECT_EQ(beyond.exit_code, 3);
   EXPECT_THAT(beyond.err, HasSubstr("0 to 5"));
 }
@@ -498,7 +547,8 @@ TEST(Unpack, KnowsTheMipsThereAre) {
 TEST(Compare, MeasuresWhatTheManifestSays) {
   TempFolder folder;
   MakeSample(folder / "floor", 64);
-  const Outcome baked = Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--json"}));
+  const Outcome baked =
+      Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--json"}));
   ASSERT_EQ(baked.exit_code, 0);
   const Json expected = LastLine(baked.out);
   const Outcome compared = Patina({"compare", folder / "out/floor", folder / "floor", "--json"});
@@ -517,10 +567,12 @@ TEST(Compare, MeasuresWhatTheManifestSays) {
 TEST(Info, DescribesTheCurrentContainer) {
   TempFolder folder;
   MakeSample(folder / "floor", 32);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code, 0);
+  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code,
+            0);
   const Outcome text = Patina({"info", folder / "out/floor"});
   EXPECT_EQ(text.exit_code, 0);
-  for (const char* word : {"32 x 32", "bcf-1k", "albedo", "features_0.dds", "mosaic_floor_arm.png", "r0001"}) {
+  for (const char* word :
+       {"32 x 32", "bcf-1k", "albedo", "features_0.dds", "mosaic_floor_arm.png", "r0001"}) {
     EXPECT_THAT(text.out, HasSubstr(word));
   }
   const Json json = LastLine(Patina({"info", folder / "out/floor/current", "--json"}).out);
@@ -530,8 +582,10 @@ TEST(Info, DescribesTheCurrentContainer) {
 
 TEST(Sample, IsTheSameForASeed) {
   TempFolder folder;
-  ASSERT_EQ(Patina({"sample", "--out", folder / "a", "--size", "32", "--threads", "1"}).exit_code, 0);
-  ASSERT_EQ(Patina({"sample", "--out", folder / "b", "--size", "32", "--threads", "2"}).exit_code, 0);
+  ASSERT_EQ(Patina({"sample", "--out", folder / "a", "--size", "32", "--threads", "1"}).exit_code,
+            0);
+  ASSERT_EQ(Patina({"sample", "--out", folder / "b", "--size", "32", "--threads", "2"}).exit_code,
+            0);
   ASSERT_EQ(Patina({"sample", "--out", folder / "c", "--size", "32", "--seed", "2"}).exit_code, 0);
   EXPECT_TRUE(Snapshot(folder / "a") == Snapshot(folder / "b"));
   EXPECT_FALSE(Snapshot(folder / "a") == Snapshot(folder / "c"));

@@ -31,7 +31,8 @@ void Redirect(const std::string& path, int fd) {
 
 }  // namespace
 
-Child::Child(const std::vector<std::string>& arguments, const ChildOptions& options) : folder_(MakeFolder()) {
+Child::Child(const std::vector<std::string>& arguments, const ChildOptions& options)
+    : folder_(MakeFolder()) {
   const std::string program = std::string(PATINA_BIN_DIR) + "/patina";
   const std::string out = folder_ + "/out";
   const std::string err = folder_ + "/err";

@@ -16,7 +16,8 @@ struct Outcome {
 };
 
 struct ChildOptions {
-  uint64_t max_file_bytes = 0;  // files may not grow beyond this (RLIMIT_FSIZE), as on a full disk; 0: no limit
+  uint64_t max_file_bytes =
+      0;  // files may not grow beyond this (RLIMIT_FSIZE), as on a full disk; 0: no limit
 };
 
 // A running `patina`. Its output goes to files, so that it never waits for a reader.

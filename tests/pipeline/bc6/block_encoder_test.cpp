@@ -22,11 +22,13 @@ constexpr auto kUf16 = bc6h::Format::kUf16;
 WeightedTarget PlainTarget(const float values[3][16]) {
   WeightedTarget target = {};
   std::memcpy(target.value, values, sizeof target.value);
-  for (int t = 0; t < 16; ++t) target.hessian[0][t] = target.hessian[3][t] = target.hessian[5][t] = 1;
+  for (int t = 0; t < 16; ++t)
+    target.hessian[0][t] = target.hessian[3][t] = target.hessian[5][t] = 1;
   return target;
 }
 
-// Legal fields of a mode with endpoints around `code_centre` (a share of the range), deltas as large as allowed.
+// Legal fields of a mode with endpoints around `code_centre` (a share of the range), deltas as
+// large as allowed.
 bc6h::BlockFields RandomFields(int mode, int partition, Rng& rng) {
   const bc6h::ModeInfo& info = bc6h::Mode(mode);
   const int max_code = (1 << info.endpoint_bits) - 1;
@@ -35,14 +37,19 @@ bc6h::BlockFields RandomFields(int mode, int partition, Rng& rng) {
   fields.partition = info.regions == 2 ? partition : 0;
   for (int c = 0; c < 3; ++c) {
     // Between 13.5 and 16.5 binades.
-    const int base = static_cast<int>(static_cast<float>(max_code) * (13.5f + 3 * rng.Uniform()) / 31);
+    const int base =
+        static_cast<int>(static_cast<float>(max_code) * (13.5f + 3 * rng.Uniform()) / 31);
     for (int e = 0; e < 2 * info.regions; ++e) {
-      const int half = info.transformed ? 1 << (info.delta_bits[c] - 1) : std::max(2, max_code / 20);
-      const int delta = e == 0 && info.transformed ? 0 : static_cast<int>(rng.Below(static_cast<uint32_t>(2 * half))) - half;
+      const int half =
+          info.transformed ? 1 << (info.delta_bits[c] - 1) : std::max(2, max_code / 20);
+      const int delta = e == 0 && info.transformed
+                            ? 0
+                            : static_cast<int>(rng.Below(static_cast<uint32_t>(2 * half))) - half;
       fields.endpoints[e][c] = std::clamp(base + delta, 0, max_code);
     }
   }
-  for (int t = 0; t < 16; ++t) fields.indices[t] = static_cast<uint8_t>(rng.Below(1u << info.index_bits));
+  for (int t = 0; t < 16; ++t)
+    fields.indices[t] = static_cast<uint8_t>(rng.Below(1u << info.index_bits));
   fields.indices[0] = static_cast<uint8_t>(fields.indices[0] & ((1 << (info.index_bits - 1)) - 1));
   if (info.regions == 2) {
     const int anchor = bc6h::AnchorTexel(partition);
@@ -59,11 +66,13 @@ SoftBlock SoftOfFields(const bc6h::BlockFields& fields) {
   for (int e = 0; e < 4; ++e) {
     for (int c = 0; c < 3; ++c) {
       const int code = fields.endpoints[info.regions == 2 ? e : e % 2][c];
-      soft.endpoint[e][c] = static_cast<float>(bc6h::Unquantize(code, info.endpoint_bits, kUf16)) * 31.0f / 65536;
+      soft.endpoint[e][c] =
+          static_cast<float>(bc6h::Unquantize(code, info.endpoint_bits, kUf16)) * 31.0f / 65536;
     }
   }
   for (int t = 0; t < 16; ++t) {
-    soft.index[t] = static_cast<float>(fields.indices[t]) / static_cast<float>((1 << info.index_bits) - 1);
+    soft.index[t] =
+        static_cast<float>(fields.indices[t]) / static_cast<float>((1 << info.index_bits) - 1);
   }
   return soft;
 }
@@ -74,7 +83,8 @@ void ExpectSound(const EncodedBlock& block, const WeightedTarget& target) {
   ASSERT_TRUE(unpacked.has_value());
   EXPECT_EQ(unpacked->mode, block.fields.mode);
   EXPECT_EQ(unpacked->partition, block.fields.partition);
-  EXPECT_EQ(std::memcmp(unpacked->endpoints, block.fields.endpoints, sizeof unpacked->endpoints), 0);
+  EXPECT_EQ(std::memcmp(unpacked->endpoints, block.fields.endpoints, sizeof unpacked->endpoints),
+            0);
   EXPECT_EQ(std::memcmp(unpacked->indices, block.fields.indices, sizeof unpacked->indices), 0);
   uint16_t halves[16][3];
   bc6h::Decode(block.bytes.data(), kUf16, halves);
@@ -110,7 +120,9 @@ TEST(Encode, IsNeverWorseThanTheCurrentBlockInItsBestMode) {
       RoundSoftBlock(sample.current, mode, &fields);
       rounded = std::min(rounded, LeastErrorOverIndices(sample.target, fields));
     }
-    EXPECT_LE(static_cast<double>(Encode(sample.target, sample.current).error), rounded * (1 + 1e-5)) << seed;
+    EXPECT_LE(static_cast<double>(Encode(sample.target, sample.current).error),
+              rounded * (1 + 1e-5))
+        << seed;
   }
 }
 
@@ -128,7 +140,8 @@ TEST(Encode, GainsWhatTheExporterCountsOn) {
     six_bits += WeightedError(sample.target, values);
     int best = bc6h::kModeSixBit;
     for (int mode = 0; mode < 10; ++mode) {
-      if (bc6h::Mode(mode).endpoint_bits > bc6h::Mode(best).endpoint_bits && RoundSoftBlock(sample.current, mode, &fields)) {
+      if (bc6h::Mode(mode).endpoint_bits > bc6h::Mode(best).endpoint_bits &&
+          RoundSoftBlock(sample.current, mode, &fields)) {
         best = mode;
       }
     }
@@ -142,28 +155,32 @@ TEST(Encode, GainsWhatTheExporterCountsOn) {
   EXPECT_LE(refined, encoded);
 }
 
-// With a cost on one channel only, the best 6-bit block of a partition can be found by trying all pairs of codes.
+// With a cost on one channel only, the best 6-bit block of a partition can be found by trying all
+// pairs of codes.
 TEST(Encode, StandsUpToAnExhaustiveSearchOfTheSixBitMode) {
   double log_ratio = 0;
   constexpr int kSeeds = 16;
   for (uint64_t seed = 0; seed < kSeeds; ++seed) {
     BlockSample sample = MakeBlockSample(seed);
-    for (int q = 1; q < 6; ++q) std::fill(sample.target.hessian[q], sample.target.hessian[q] + 16, 0.0f);
+    for (int q = 1; q < 6; ++q)
+      std::fill(sample.target.hessian[q], sample.target.hessian[q] + 16, 0.0f);
     const unsigned mask = bc6h::PartitionMask(sample.current.partition);
     double best[2] = {1e30, 1e30};
     for (int a = 0; a < 64; ++a) {
       for (int b = 0; b < 64; ++b) {
         float palette[8];
         for (int k = 0; k < 8; ++k) {
-          const int32_t value = bc6h::Interpolate(bc6h::Unquantize(a, 6, kUf16), bc6h::Unquantize(b, 6, kUf16),
-                                                  bc6h::kWeights3[static_cast<size_t>(k)]);
+          const int32_t value =
+              bc6h::Interpolate(bc6h::Unquantize(a, 6, kUf16), bc6h::Unquantize(b, 6, kUf16),
+                                bc6h::kWeights3[static_cast<size_t>(k)]);
           palette[k] = HalfToFloat(bc6h::FinishUnquantize(value, kUf16));
         }
         double error[2] = {};
         for (int t = 0; t < 16; ++t) {
           double least = 1e30;
           for (float entry : palette) {
-            const double d = static_cast<double>(entry) - static_cast<double>(sample.target.value[0][t]);
+            const double d =
+                static_cast<double>(entry) - static_cast<double>(sample.target.value[0][t]);
             least = std::min(least, static_cast<double>(sample.target.hessian[0][t]) * d * d);
           }
           error[(mask >> t) & 1] += least;
@@ -171,11 +188,13 @@ TEST(Encode, StandsUpToAnExhaustiveSearchOfTheSixBitMode) {
         for (int r = 0; r < 2; ++r) best[r] = std::min(best[r], error[r]);
       }
     }
-    EXPECT_LE(static_cast<double>(Encode(sample.target, sample.current).error), (best[0] + best[1]) * (1 + 1e-5));
+    EXPECT_LE(static_cast<double>(Encode(sample.target, sample.current).error),
+              (best[0] + best[1]) * (1 + 1e-5));
     // The same mode and partition, from the rounded block: the search over codes alone.
     bc6h::BlockFields start;
     ASSERT_TRUE(RoundSoftBlock(sample.current, bc6h::kModeSixBit, &start));
-    const double ratio = static_cast<double>(Refine(sample.target, start).error) / (best[0] + best[1]);
+    const double ratio =
+        static_cast<double>(Refine(sample.target, start).error) / (best[0] + best[1]);
     EXPECT_GE(ratio, 1 - 1e-5) << seed;
     log_ratio += std::log(ratio) / kSeeds;
   }
@@ -327,7 +346,8 @@ TEST(Encode, TakesTheWholeRangeOfValues) {
 }
 
 TEST(Encode, SurvivesNonFiniteInput) {
-  const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN(),
+              inf = std::numeric_limits<float>::infinity();
   for (float bad : {nan, inf, -inf, 3e38f, -3e38f}) {
     for (uint64_t seed = 0; seed < 60; ++seed) {
       BlockSample sample = MakeBlockSample(seed);
@@ -364,7 +384,8 @@ TEST(Encode, GivesASoftBlockThatDecodesToTheSame) {
     DecodeToFloat(block.fields, decoded);
     for (int n = 0; n < 48; ++n) {
       const float value = (&decoded[0][0])[n];
-      EXPECT_NEAR((&soft[0][0])[n], value, value * 2.5f / 1024) << seed;  // a half's last place and a bit
+      EXPECT_NEAR((&soft[0][0])[n], value, value * 2.5f / 1024)
+          << seed;  // a half's last place and a bit
     }
   }
 }

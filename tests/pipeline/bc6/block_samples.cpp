@@ -19,7 +19,9 @@ float Normal(Rng& rng) {
 
 float Between(Rng& rng, float low, float high) { return low + (high - low) * rng.Uniform(); }
 
-float ExpBetween(Rng& rng, float low, float high) { return low * std::exp2(rng.Uniform() * std::log2(high / low)); }
+float ExpBetween(Rng& rng, float low, float high) {
+  return low * std::exp2(rng.Uniform() * std::log2(high / low));
+}
 
 float FromBinades(float binades) {
   const float exponent = std::max(std::floor(binades), 1.0f);
@@ -28,8 +30,8 @@ float FromBinades(float binades) {
 
 double TexelError(const WeightedTarget& target, int t, const double d[3]) {
   const auto h = [&](int q) { return static_cast<double>(target.hessian[q][t]); };
-  return d[0] * (h(0) * d[0] + 2 * h(1) * d[1] + 2 * h(2) * d[2]) + d[1] * (h(3) * d[1] + 2 * h(4) * d[2]) +
-         d[2] * h(5) * d[2];
+  return d[0] * (h(0) * d[0] + 2 * h(1) * d[1] + 2 * h(2) * d[2]) +
+         d[1] * (h(3) * d[1] + 2 * h(4) * d[2]) + d[2] * h(5) * d[2];
 }
 
 }  // namespace
@@ -57,7 +59,8 @@ BlockSample MakeBlockSample(uint64_t seed) {
     const float x = static_cast<float>(t % 4) - 1.5f, y = static_cast<float>(t / 4) - 1.5f;
     const float side = std::clamp(2 * (x * cosine + y * sine - offset), -1.0f, 1.0f);
     float z[3];
-    for (int c = 0; c < 3; ++c) z[c] = slope[c][0] * x + slope[c][1] * y + jump[c] * side + noise * Normal(rng);
+    for (int c = 0; c < 3; ++c)
+      z[c] = slope[c][0] * x + slope[c][1] * y + jump[c] * side + noise * Normal(rng);
     for (int c = 0; c < 3; ++c) {
       const float mixed = z[c] + mix[c][0] * z[0] + mix[c][1] * z[1] + mix[c][2] * z[2];
       sample.texels[c][t] = std::clamp(1.0f + 0.25f * (base[c] + mixed), 0.05f, 8.0f);
@@ -107,7 +110,8 @@ double WeightedError(const WeightedTarget& target, const float values[3][16]) {
   double error = 0;
   for (int t = 0; t < 16; ++t) {
     double d[3];
-    for (int c = 0; c < 3; ++c) d[c] = static_cast<double>(values[c][t]) - static_cast<double>(target.value[c][t]);
+    for (int c = 0; c < 3; ++c)
+      d[c] = static_cast<double>(values[c][t]) - static_cast<double>(target.value[c][t]);
     error += TexelError(target, t, d);
   }
   return error;
@@ -122,7 +126,8 @@ double LeastErrorOverIndices(const WeightedTarget& target, const bc6h::BlockFiel
     if (order == 1) std::swap(trial.endpoints[0], trial.endpoints[1]);
     std::fill(trial.indices, trial.indices + 16, uint8_t{0});
     if (!bc6h::Pack(trial, bc6h::Format::kUf16)) continue;
-    // Entry k of all texels at once, then each texel takes its best. Region 1 may always be turned round: no limit there.
+    // Entry k of all texels at once, then each texel takes its best. Region 1 may always be turned
+    // round: no limit there.
     double best[16];
     std::fill(best, best + 16, std::numeric_limits<double>::infinity());
     for (int k = 0; k < entries; ++k) {
@@ -132,7 +137,8 @@ double LeastErrorOverIndices(const WeightedTarget& target, const bc6h::BlockFiel
       for (int t = 0; t < 16; ++t) {
         if (t == 0 && k >= entries / 2) continue;
         double d[3];
-        for (int c = 0; c < 3; ++c) d[c] = static_cast<double>(values[c][t]) - static_cast<double>(target.value[c][t]);
+        for (int c = 0; c < 3; ++c)
+          d[c] = static_cast<double>(values[c][t]) - static_cast<double>(target.value[c][t]);
         best[t] = std::min(best[t], TexelError(target, t, d));
       }
     }
@@ -151,11 +157,13 @@ bool RoundSoftBlock(const SoftBlock& block, int mode, bc6h::BlockFields* fields)
   const double step = std::ldexp(31.0, -info.endpoint_bits);
   for (int e = 0; e < 4; ++e) {
     for (int c = 0; c < 3; ++c) {
-      const auto code = static_cast<int>(std::lround(static_cast<double>(block.endpoint[e][c]) / step - 0.5));
+      const auto code =
+          static_cast<int>(std::lround(static_cast<double>(block.endpoint[e][c]) / step - 0.5));
       fields->endpoints[e][c] = std::clamp(code, 0, (1 << info.endpoint_bits) - 1);
     }
   }
-  for (int t = 0; t < 16; ++t) fields->indices[t] = static_cast<uint8_t>(std::lround(block.index[t] * 7));
+  for (int t = 0; t < 16; ++t)
+    fields->indices[t] = static_cast<uint8_t>(std::lround(block.index[t] * 7));
   bc6h::FixAnchors(fields);
   return bc6h::Pack(*fields, bc6h::Format::kUf16).has_value();
 }

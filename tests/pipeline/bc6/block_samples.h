@@ -1,5 +1,5 @@
-// Blocks as the exporter meets them, made from a seed: three correlated channels around 1.0 with gradients, noise and
-// edges, and Hessians from Jacobians of nine outputs whose sizes differ.
+// Blocks as the exporter meets them, made from a seed: three correlated channels around 1.0 with
+// gradients, noise and edges, and Hessians from Jacobians of nine outputs whose sizes differ.
 #pragma once
 
 #include <cstdint>
@@ -22,11 +22,13 @@ void SoftValues(const SoftBlock& block, float out[3][16]);
 // sum over texels of (values - target)^T H (values - target), in double.
 double WeightedError(const WeightedTarget& target, const float values[3][16]);
 
-// The least WeightedError of the fields' mode, partition and endpoints over all legal indices, with either end of region 0
-// as the first; by plain search over decoded values. Infinite where no order of the endpoints is legal.
+// The least WeightedError of the fields' mode, partition and endpoints over all legal indices, with
+// either end of region 0 as the first; by plain search over decoded values. Infinite where no order
+// of the endpoints is legal.
 double LeastErrorOverIndices(const WeightedTarget& target, const bc6h::BlockFields& fields);
 
-// The soft block rounded to the codes of one mode, indices to their nearest; false where the mode cannot hold it.
+// The soft block rounded to the codes of one mode, indices to their nearest; false where the mode
+// cannot hold it.
 bool RoundSoftBlock(const SoftBlock& block, int mode, bc6h::BlockFields* fields);
 
 }  // namespace patina::bc6

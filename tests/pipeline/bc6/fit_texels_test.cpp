@@ -16,8 +16,8 @@ double Binades(float value) {
   return exponent - 1 + 15 + (2 * fraction - 1);
 }
 
-// Squared distances to the principal lines of a partition's regions, in double: the trace of each region's covariance
-// less its largest eigenvalue (by the power method).
+// Squared distances to the principal lines of a partition's regions, in double: the trace of each
+// region's covariance less its largest eigenvalue (by the power method).
 double LineResidual(const float texels[3][16], int partition) {
   const unsigned mask = bc6h::PartitionMask(partition);
   double residual = 0;
@@ -58,7 +58,8 @@ double SoftResidual(const float texels[3][16], const SoftBlock& block) {
   for (int t = 0; t < 16; ++t) {
     const int r = (mask >> t) & 1;
     for (int c = 0; c < 3; ++c) {
-      const double a = static_cast<double>(block.endpoint[2 * r][c]), b = static_cast<double>(block.endpoint[2 * r + 1][c]);
+      const double a = static_cast<double>(block.endpoint[2 * r][c]),
+                   b = static_cast<double>(block.endpoint[2 * r + 1][c]);
       const double d = a + static_cast<double>(block.index[t]) * (b - a) - Binades(texels[c][t]);
       residual += d * d;
     }
@@ -82,7 +83,8 @@ TEST(FitTexels, RecoversTwoSegmentsOfEveryPartition) {
     float back[3][16];
     SoftValues(fit, back);
     for (int c = 0; c < 3; ++c) {
-      for (int t = 0; t < 16; ++t) EXPECT_NEAR(back[c][t], texels[c][t], 2e-3f) << partition << ' ' << c << ' ' << t;
+      for (int t = 0; t < 16; ++t)
+        EXPECT_NEAR(back[c][t], texels[c][t], 2e-3f) << partition << ' ' << c << ' ' << t;
     }
   }
 }
@@ -91,15 +93,24 @@ TEST(FitTexels, LeavesTheLeastResidualOfAllPartitions) {
   for (uint64_t seed = 0; seed < 200; ++seed) {
     const BlockSample sample = MakeBlockSample(seed);
     double least = std::numeric_limits<double>::infinity();
-    for (int p = 0; p < bc6h::kPartitionCount; ++p) least = std::min(least, LineResidual(sample.texels, p));
+    for (int p = 0; p < bc6h::kPartitionCount; ++p)
+      least = std::min(least, LineResidual(sample.texels, p));
     // The two per cent are for nearly round clouds, where the power method has not settled.
     EXPECT_LE(SoftResidual(sample.texels, sample.current), 1.02 * least + 1e-6) << seed;
   }
 }
 
 TEST(FitTexels, KeepsItsRangesOnAnyInput) {
-  const float odd[] = {0.0f, -1.0f, 1e-30f, 6e-5f, 1.0f, 65504.0f, 1e30f, std::numeric_limits<float>::infinity(),
-                       -std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()};
+  const float odd[] = {0.0f,
+                       -1.0f,
+                       1e-30f,
+                       6e-5f,
+                       1.0f,
+                       65504.0f,
+                       1e30f,
+                       std::numeric_limits<float>::infinity(),
+                       -std::numeric_limits<float>::infinity(),
+                       std::numeric_limits<float>::quiet_NaN()};
   for (uint64_t seed = 0; seed < 300; ++seed) {
     Rng rng(seed, 3);
     float texels[3][16];

@@ -24,14 +24,21 @@ std::vector<BlockSample> MixedSamples() {
     Rng rng(seed, 5);
     const int c = static_cast<int>(rng.Below(3)), t = static_cast<int>(rng.Below(16));
     switch (seed % 12) {
-      case 0: sample.target.value[c][t] = std::numeric_limits<float>::quiet_NaN(); break;
-      case 3: sample.target.value[c][t] = 0.0f; break;
-      case 6: sample.target.hessian[0][t] = 1e9f; break;
+      case 0:
+        sample.target.value[c][t] = std::numeric_limits<float>::quiet_NaN();
+        break;
+      case 3:
+        sample.target.value[c][t] = 0.0f;
+        break;
+      case 6:
+        sample.target.hessian[0][t] = 1e9f;
+        break;
       case 9:
         for (auto& row : sample.target.hessian) row[t] = 0;
         sample.target.value[c][t] = 60000.0f;
         break;
-      default: break;
+      default:
+        break;
     }
     samples.push_back(sample);
   }
@@ -51,12 +58,14 @@ std::vector<Outcome> RunAll(const std::vector<BlockSample>& samples) {
 }
 
 bool SameBits(const SoftBlock& a, const SoftBlock& b) {
-  return a.partition == b.partition && std::memcmp(a.endpoint, b.endpoint, sizeof a.endpoint) == 0 &&
+  return a.partition == b.partition &&
+         std::memcmp(a.endpoint, b.endpoint, sizeof a.endpoint) == 0 &&
          std::memcmp(a.index, b.index, sizeof a.index) == 0;
 }
 
 bool SameBits(const EncodedBlock& a, const EncodedBlock& b) {
-  return a.bytes == b.bytes && SameBits(a.soft, b.soft) && std::memcmp(&a.error, &b.error, sizeof a.error) == 0;
+  return a.bytes == b.bytes && SameBits(a.soft, b.soft) &&
+         std::memcmp(&a.error, &b.error, sizeof a.error) == 0;
 }
 
 class SimdTargets : public testing::Test {
@@ -65,7 +74,8 @@ class SimdTargets : public testing::Test {
 };
 
 TEST_F(SimdTargets, GiveTheSameBits) {
-  if (!SimdTargetSupported(SimdTarget::kAvx512)) GTEST_SKIP() << "this CPU has no AVX-512 to compare with";
+  if (!SimdTargetSupported(SimdTarget::kAvx512))
+    GTEST_SKIP() << "this CPU has no AVX-512 to compare with";
   const std::vector<BlockSample> samples = MixedSamples();
   ASSERT_TRUE(ForceSimdTarget("avx2").has_value());
   const std::vector<Outcome> narrow = RunAll(samples);

@@ -45,8 +45,9 @@ JobResult Failed(int exit_code) {
 }
 
 TEST(JobResultToJson, FollowsItsSchema) {
-  for (const JobResult& result : {Done(), Failed(kExitBadInput), Failed(kExitFailed), Failed(kExitQualityGate),
-                                  Failed(kExitInterrupted), JobResult{}}) {
+  for (const JobResult& result :
+       {Done(), Failed(kExitBadInput), Failed(kExitFailed), Failed(kExitQualityGate),
+        Failed(kExitInterrupted), JobResult{}}) {
     const std::string line = JobResultToJson(result, -1);
     EXPECT_EQ(line.find('\n'), std::string::npos);
     const Status status = CheckAgainstSchema("result", Json::parse(line));
@@ -55,7 +56,8 @@ TEST(JobResultToJson, FollowsItsSchema) {
   const Json json = Json::parse(JobResultToJson(Done(), 2));
   EXPECT_EQ(json["psnr"]["maps"]["normal"], 33);
   EXPECT_TRUE(json["flip"].is_null());
-  EXPECT_EQ(Json::parse(JobResultToJson(Failed(kExitQualityGate), -1))["error"]["code"], "quality_gate");
+  EXPECT_EQ(Json::parse(JobResultToJson(Failed(kExitQualityGate), -1))["error"]["code"],
+            "quality_gate");
 }
 
 TEST(ExitCodeFor, TellsBadInputFromOtherFailures) {
@@ -103,8 +105,9 @@ TEST(EventLog, WritesLinesThatFollowTheirSchema) {
     EXPECT_EQ(json["seq"], seq++);
     types.push_back(json["type"]);
   }
-  EXPECT_EQ(types, (std::vector<std::string>{"stage_started", "note", "warning", "stage_finished", "stage_started", "progress",
-                                             "progress", "result", "error"}));
+  EXPECT_EQ(types,
+            (std::vector<std::string>{"stage_started", "note", "warning", "stage_finished",
+                                      "stage_started", "progress", "progress", "result", "error"}));
   std::filesystem::remove(path);
 }
 
@@ -113,7 +116,8 @@ TEST(EventLog, ThinsProgressToTenASecond) {
   {
     auto log = EventLog::Open(path);
     ASSERT_TRUE(log);
-    for (int i = 0; i < 10000; ++i) log->OnProgress({.stage = "train", .fraction = 0.5, .message = ""});
+    for (int i = 0; i < 10000; ++i)
+      log->OnProgress({.stage = "train", .fraction = 0.5, .message = ""});
   }
   auto text = ReadTextFile(path, 10 << 20);
   ASSERT_TRUE(text);

@@ -19,7 +19,9 @@ std::string Example(const std::string& name) {
   return std::string(PATINA_SOURCE_DIR) + "/schemas/examples/" + name;
 }
 
-Json Minimal() { return {{"version", 1}, {"kind", "material"}, {"asset", "a"}, {"folder", "f"}, {"out", "o"}}; }
+Json Minimal() {
+  return {{"version", 1}, {"kind", "material"}, {"asset", "a"}, {"folder", "f"}, {"out", "o"}};
+}
 
 // What the parser says to the minimal job with one field changed; "" if it accepts it.
 std::string Complaint(const std::string& key, const Json& value) {
@@ -83,8 +85,8 @@ TEST(ParseJob, ListsAllProblemsAtOnceWithTheirPointers) {
   auto job = ReadJobFile(Example("job_invalid_many_problems.json"));
   ASSERT_FALSE(job);
   EXPECT_EQ(job.error().code, ErrorCode::kInvalidArgument);
-  for (const char* pointer : {"/asset: ", "/maps/0/channels: ", "/maps/1/role: ", "/maps/1/file: ", "/out: ", "/profile: ",
-                              "/seed: ", "/threads: ", "/min_psnr_db: "}) {
+  for (const char* pointer : {"/asset: ", "/maps/0/channels: ", "/maps/1/role: ", "/maps/1/file: ",
+                              "/out: ", "/profile: ", "/seed: ", "/threads: ", "/min_psnr_db: "}) {
     EXPECT_THAT(job.error().message, HasSubstr(pointer));
   }
   EXPECT_THAT(job.error().message, HasSubstr("9 problems"));
@@ -117,13 +119,15 @@ TEST(ParseJob, RefusesTrailingBytes) {
 }
 
 TEST(ParseJob, RefusesOtherShapesOfJson) {
-  for (const char* text : {"", "null", "[]", "1", "\"job\"", "{}", "[{}]", "\xff\xfe{}", "{\"version\":1,}"}) {
+  for (const char* text :
+       {"", "null", "[]", "1", "\"job\"", "{}", "[{}]", "\xff\xfe{}", "{\"version\":1,}"}) {
     EXPECT_FALSE(ParseJob(text, "", "job.json")) << text;
   }
 }
 
 TEST(ParseJob, RefusesDeepNestingWithoutExhaustingTheStack) {
-  const std::string deep = "{\"asset\":" + std::string(1000000, '[') + std::string(1000000, ']') + "}";
+  const std::string deep =
+      "{\"asset\":" + std::string(1000000, '[') + std::string(1000000, ']') + "}";
   auto job = ParseJob(deep, "", "job.json");
   ASSERT_FALSE(job);
   EXPECT_THAT(job.error().message, HasSubstr("nested deeper"));
@@ -132,7 +136,9 @@ TEST(ParseJob, RefusesDeepNestingWithoutExhaustingTheStack) {
 }
 
 TEST(ParseJob, RefusesAKeyThatStandsTwice) {
-  auto job = ParseJob(R"({"version":1,"kind":"material","asset":"a","asset":"b","folder":"f","out":"o"})", "", "job.json");
+  auto job =
+      ParseJob(R"({"version":1,"kind":"material","asset":"a","asset":"b","folder":"f","out":"o"})",
+               "", "job.json");
   ASSERT_FALSE(job);
   EXPECT_THAT(job.error().message, HasSubstr("\"asset\" stands twice"));
 }
@@ -169,7 +175,8 @@ TEST(ParseJob, HoldsNumbersToTheirRanges) {
 }
 
 TEST(ParseJob, RefusesNamesThatLeaveTheOutputFolder) {
-  for (const char* name : {"..", ".", ".hidden", "a/b", "/abs", "-flag", "a b", "caf\xC3\xA9", "a\nb"}) {
+  for (const char* name :
+       {"..", ".", ".hidden", "a/b", "/abs", "-flag", "a b", "caf\xC3\xA9", "a\nb"}) {
     EXPECT_NE(Complaint("asset", name), "") << name;
   }
   EXPECT_NE(Complaint("asset", std::string(101, 'a')), "");
@@ -198,7 +205,9 @@ TEST(ReadJobFile, RefusesAFileThatIsTooLarge) {
 
 TEST(ReadMapListFile, ReadsAnArrayOfMaps) {
   const std::string path = testing::TempDir() + "patina_maps.json";
-  ASSERT_TRUE(WriteFileDurably(path, std::string_view(R"([{"role":"albedo","file":"c.png"},{"role":"ao","file":"/x.png"}])")));
+  ASSERT_TRUE(WriteFileDurably(
+      path,
+      std::string_view(R"([{"role":"albedo","file":"c.png"},{"role":"ao","file":"/x.png"}])")));
   auto maps = ReadMapListFile(path);
   ASSERT_TRUE(maps) << maps.error().message;
   ASSERT_EQ(maps->size(), 2u);
@@ -209,27 +218,69 @@ TEST(ReadMapListFile, ReadsAnArrayOfMaps) {
   std::filesystem::remove(path);
 }
 
-// The parser and the published schema must agree, or a file that an editor calls valid would be refused.
+// The parser and the published schema must agree, or a file that an editor calls valid would be
+// refused.
 TEST(JobSchema, AgreesWithTheParser) {
   std::vector<Json> documents;
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(PATINA_SOURCE_DIR) + "/schemas/examples")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(PATINA_SOURCE_DIR) + "/schemas/examples")) {
     if (entry.path().filename().string().rfind("job_", 0) != 0) continue;
     auto text = ReadTextFile(entry.path().string(), kMaxJobBytes);
     ASSERT_TRUE(text);
     documents.push_back(Json::parse(*text));
   }
   ASSERT_GE(documents.size(), 5u);
-  const std::vector<Json> values = {Json(nullptr),   Json(true),     Json(0),          Json(-1),        Json(1),
-                                    Json(1.5),       Json(1000000000),      Json(1e300),      Json(""),        Json("x"),
-                                    Json("auto"),    Json("wrap"),   Json("material"), Json("a b"),     Json("-a"),
-                                    Json("bcf-1k"),  Json("paper"),  Json("preview"),  Json("directx"), Json::array(),
-                                    Json::object(),  Json::array({1}), Json("\xC3\xA9"), Json("a\n"),   Json(std::string(101, 'a')),
-                                    Json::array({Json::object()}), Json::array({{{"role", "ao"}, {"file", "f"}, {"extra", 1}}}),
-                                    Json::array({{{"role", "ao"}, {"file", "f"}, {"channels", "rg"}}}),
-                                    Json::array({{{"role", "ao"}, {"file", "f"}, {"channels", "x"}}})};
-  for (const char* key : {"version", "kind", "asset", "folder", "set", "maps", "out", "profile", "quality", "recipe", "seed",
-                          "threads", "target_psnr_db", "time_budget_s", "samples", "min_psnr_db", "address",
-                          "normal_convention", "repair_nonfinite", "toksvig", "unknown"}) {
+  const std::vector<Json> values = {
+      Json(nullptr),
+      Json(true),
+      Json(0),
+      Json(-1),
+      Json(1),
+      Json(1.5),
+      Json(1000000000),
+      Json(1e300),
+      Json(""),
+      Json("x"),
+      Json("auto"),
+      Json("wrap"),
+      Json("material"),
+      Json("a b"),
+      Json("-a"),
+      Json("bcf-1k"),
+      Json("paper"),
+      Json("preview"),
+      Json("directx"),
+      Json::array(),
+      Json::object(),
+      Json::array({1}),
+      Json("\xC3\xA9"),
+      Json("a\n"),
+      Json(std::string(101, 'a')),
+      Json::array({Json::object()}),
+      Json::array({{{"role", "ao"}, {"file", "f"}, {"extra", 1}}}),
+      Json::array({{{"role", "ao"}, {"file", "f"}, {"channels", "rg"}}}),
+      Json::array({{{"role", "ao"}, {"file", "f"}, {"channels", "x"}}})};
+  for (const char* key : {"version",
+                          "kind",
+                          "asset",
+                          "folder",
+                          "set",
+                          "maps",
+                          "out",
+                          "profile",
+                          "quality",
+                          "recipe",
+                          "seed",
+                          "threads",
+                          "target_psnr_db",
+                          "time_budget_s",
+                          "samples",
+                          "min_psnr_db",
+                          "address",
+                          "normal_convention",
+                          "repair_nonfinite",
+                          "toksvig",
+                          "unknown"}) {
     for (const Json& value : values) {
       Json json = Minimal();
       json[key] = value;
@@ -260,13 +311,17 @@ TEST(CanonicalJob, LeavesOutWhatDoesNotChangeTheBytes) {
   b.threads = 7;
   b.min_psnr_db = 30;
   EXPECT_EQ(CanonicalJob(a), CanonicalJob(b));
-  for (auto change : {+[](Job* j) { j->seed = 2; }, +[](Job* j) { j->profile = Profile::kBcf2k; },
-                      +[](Job* j) { j->quality = Quality::kPreview; }, +[](Job* j) { j->recipe = Recipe::kPaper; },
-                      +[](Job* j) { j->address = AddressMode::kClamp; }, +[](Job* j) { j->toksvig = false; },
-                      +[](Job* j) { j->samples = 5; }, +[](Job* j) { j->normal_convention = "directx"; },
-                      +[](Job* j) { j->target_psnr_db = 5; }, +[](Job* j) { j->time_budget_s = 5; },
-                      +[](Job* j) { j->repair_nonfinite = true; }, +[](Job* j) { j->asset = "wall"; },
-                      +[](Job* j) { j->maps.push_back({"ao", "f.png", "r", "auto", "auto", false}); }}) {
+  for (auto change :
+       {+[](Job* j) { j->seed = 2; }, +[](Job* j) { j->profile = Profile::kBcf2k; },
+        +[](Job* j) { j->quality = Quality::kPreview; },
+        +[](Job* j) { j->recipe = Recipe::kPaper; },
+        +[](Job* j) { j->address = AddressMode::kClamp; }, +[](Job* j) { j->toksvig = false; },
+        +[](Job* j) { j->samples = 5; }, +[](Job* j) { j->normal_convention = "directx"; },
+        +[](Job* j) { j->target_psnr_db = 5; }, +[](Job* j) { j->time_budget_s = 5; },
+        +[](Job* j) { j->repair_nonfinite = true; }, +[](Job* j) { j->asset = "wall"; },
+        +[](Job* j) {
+          j->maps.push_back({"ao", "f.png", "r", "auto", "auto", false});
+        }}) {
     Job changed = a;
     change(&changed);
     EXPECT_NE(CanonicalJob(a), CanonicalJob(changed));

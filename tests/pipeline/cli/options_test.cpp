@@ -1,0 +1,160 @@
+#include "pipeline/cli/options.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace patina {
+namespace {
+
+using testing::HasSubstr;
+
+ParsedCommandLine Parse(std::vector<const char*> arguments) {
+  arguments.insert(arguments.begin(), "patina");
+  return ParseCommandLine(static_cast<int>(arguments.size()), arguments.data());
+}
+
+TEST(ParseCommandLine, LeavesOutWhatIsNotGiven) {
+  const ParsedCommandLine parsed = Parse({"bake", "folder"});
+  ASSERT_TRUE(parsed.command) << parsed.text;
+  EXPECT_EQ(parsed.command->command, Command::kBake);
+  EXPECT_EQ(parsed.command->bake.inputs, std::vector<std::string>{"folder"});
+  const JobOverrides& job = parsed.command->bake.job;
+  EXPECT_FALSE(job.out || job.profile || job.quality || job.recipe || job.address ||
+               job.normal_convention || job.seed || job.threads || job.target_psnr_db ||
+               job.time_budget_s || job.samples || job.min_psnr_db);
+  EXPECT_FALSE(job.repair_nonfinite || job.no_toksvig);
+  EXPECT_EQ(parsed.command->simd, "");
+  EXPECT_EQ(parsed.command->verbosity, Verbosity::kNormal);
+}
+
+TEST(ParseCommandLine, ReadsEveryOptionOfBake) {
+  const ParsedCommandLine parsed = Parse({"bake",
+                                          "a",
+                                          "b",
+                                          "--out",
+                                          "o",
+                                          "--profile",
+                                          "bcf-2k++",
+                                          "--quality",
+                                          "reference",
+                                          "--target-psnr",
+                                          "35.5",
+                                          "--time-budget",
+                                          "60",
+                                          "--min-psnr",
+                                          "30",
+                                          "--recipe",
+                                          "paper",
+                                          "--seed",
+                                          "9",
+                                          "--threads",
+                                          "2",
+                                          "--maps",
+                                          "m.json",
+                                          "--json",
+                                          "--simd",
+                                          "avx2",
+                                          "--address",
+                                          "clamp",
+                                          "--samples",
+                                          "1e6",
+                                          "--verbose",
+                                          "--no-toksvig",
+                                          "--repair-nonfinite",
+                                          "--normal-convention",
+                                          "directx"});
+  ASSERT_TRUE(parsed.command) << parsed.text;
+  const JobOverrides& job = parsed.command->bake.job;
+  EXPECT_EQ(parsed.command->bake.inputs.size(), 2u);
+  EXPECT_EQ(job.out, "o");
+  EXPECT_EQ(job.profile, "bcf-2k++");
+  EXPECT_EQ(job.quality, "reference");
+  EXPECT_EQ(job.target_psnr_db, 35.5);
+  EXPECT_EQ(job.time_budget_s, 60);
+  EXPECT_EQ(job.min_psnr_db, 30);
+  EXPECT_EQ(job.recipe, "paper");
+  EXPECT_EQ(job.seed, 9u);
+  EXPECT_EQ(job.threads, 2);
+  EXPECT_EQ(job.address, "clamp");
+  EXPECT_EQ(job.samples, 1e6);
+  EXPECT_EQ(job.normal_convention, "directx");
+  EXPECT_TRUE(job.repair_nonfinite);
+  EXPECT_TRUE(job.no_toksvig);
+  EXPECT_EQ(parsed.command->bake.map_list, "m.json");
+  EXPECT_TRUE(parsed.command->json);
+  EXPECT_EQ(parsed.command->simd, "avx2");
+  EXPECT_EQ(parsed.command->verbosity, Verbosity::kVerbose);
+}
+
+TEST(ParseCommandLine, ReadsTheOtherCommands) {
+  const ParsedCommandLine run = Parse({"run", "j.json", "--events", "e", "--result", "r"});
+  ASSERT_TRUE(run.command);
+  EXPECT_EQ(run.command->command, Command::kRun);
+  EXPECT_EQ(run.command->run.job_file, "j.json");
+  EXPECT_EQ(run.command->run.events, "e");
+  EXPECT_EQ(run.command->run.result, "r");
+  const ParsedCommandLine unpack =
+      Parse({"unpack", "c", "--out", "d", "--mip", "3", "--format", "exr"});
+  ASSERT_TRUE(unpack.command);
+  EXPECT_EQ(unpack.command->unpack.mip, 3);
+  EXPECT_EQ(unpack.command->unpack.format, "exr");
+  const ParsedCommandLine compare = Parse({"compare", "c", "s", "--json"});
+  ASSERT_TRUE(compare.command);
+  EXPECT_EQ(compare.command->compare.source, "s");
+  const ParsedCommandLine sample = Parse({"sample", "--out", "d", "--size", "256", "--seed", "4"});
+  ASSERT_TRUE(sample.command);
+  EXPECT_EQ(sample.command->sample.size, 256);
+  EXPECT_EQ(sample.command->sample.seed, 4u);
+}
+
+TEST(ParseCommandLine, AnswersAMistakeWithTheOptionAndWhereToLook) {
+  const ParsedCommandLine parsed = Parse({"bake", "x", "--profile", "huge"});
+  EXPECT_FALSE(parsed.command);
+  EXPECT_EQ(parsed.exit_code, 2);
+  EXPECT_THAT(parsed.text, HasSubstr("--profile"));
+  EXPECT_THAT(parsed.text, HasSubstr("bcf-1k"));
+  EXPECT_THAT(parsed.text, HasSubstr("patina bake --help"));
+}
+
+TEST(ParseCommandLine, RefusesNumbersThatAreNone) {
+  for (const char* number : {"", "x", "-1", "1.5", "99999999999999999999", "nan"}) {
+    EXPECT_EQ(Parse({"bake", "x", "--seed", number}).exit_code, 2) << number;
+  }
+  for (const char* number : {"", "x", "-1", "101", "nan", "inf"}) {
+    EXPECT_EQ(Parse({"bake", "x", "--min-psnr", number}).exit_code, 2) << number;
+  }
+}
+
+TEST(ProgressLine, LeavesOutWhatIsNotKnown) {
+  ProgressEvent event;
+  event.stage = "ingest";
+  EXPECT_EQ(ProgressLine("floor", event), "floor: ingest");
+  event.stage = "train";
+  event.fraction = 0.634;
+  event.samples_per_s = 29.44e6;
+  event.psnr_db = 31.21;
+  event.eta_s = 11.2;
+  EXPECT_EQ(ProgressLine("floor", event),
+            "floor: train 63 %, 29.4 M samples/s, 31.2 dB, 11 s left");
+}
+
+TEST(DurationText, ChangesItsUnit) {
+  EXPECT_EQ(DurationText(-1), "0.0 s");
+  EXPECT_EQ(DurationText(0.04), "0.0 s");
+  EXPECT_EQ(DurationText(9.94), "9.9 s");
+  EXPECT_EQ(DurationText(9.96), "10 s");
+  EXPECT_EQ(DurationText(59.4), "59 s");
+  EXPECT_EQ(DurationText(59.6), "1 min 00 s");
+  EXPECT_EQ(DurationText(125), "2 min 05 s");
+  EXPECT_EQ(DurationText(3725), "1 h 02 min");
+}
+
+TEST(BytesText, ChangesItsUnit) {
+  EXPECT_EQ(BytesText(999), "999 bytes");
+  EXPECT_EQ(BytesText(1500), "1.5 kB");
+  EXPECT_EQ(BytesText(1.77e6), "1.77 MB");
+  EXPECT_EQ(BytesText(2e9), "2.00 GB");
+}
+
+}  // namespace
+}  // namespace patina
