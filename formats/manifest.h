@@ -86,11 +86,11 @@ struct ManifestChannel {
   std::string component;  // "r", "g", "b", "x", "y", or "" for a map of one channel
   std::string encoding =
       "linear";         // "linear", "srgb" or "normal_xy": coded value -> physical value
-  float scale = 1;      // of "linear": physical value = coded value * scale; > 0
   float range_min = 0;  // coded; decoders clamp to it
   float range_max = 1;
   int output = -1;     // output of the network, or -1 for a constant
   float constant = 0;  // coded; used when output < 0
+  float scale = 1;      // of "linear": physical value = coded value * scale; > 0
 };
 
 // How a map was stored in the source, so that it can be written back the same way.

@@ -284,7 +284,7 @@ TEST(Decoder, GivesPhysicalValues) {
   decoder.Coded(0.1, 0.2, 0.3, coded.data());
   decoder.Physical(0.1, 0.2, 0.3, physical.data());
   for (size_t c = 0; c < coded.size(); ++c) {
-    EXPECT_EQ(physical[c], Decoder::ToPhysical(decoder.channels()[c].encoding, coded[c]));
+    EXPECT_EQ(physical[c], Decoder::ToPhysical(decoder.channels()[c], coded[c]));
   }
   EXPECT_EQ(decoder.channels()[2].output, -1);
   EXPECT_EQ(coded[2], 0.25f);

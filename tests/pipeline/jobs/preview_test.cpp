@@ -61,7 +61,7 @@ TEST(Preview, ShowsSourceDecodedAndTheirDifference) {
 
 TEST(Preview, TakesAnySize) {
   ThreadPool pool(1);
-  for (const auto [width, height] : {std::pair{1, 1}, {1, 4000}, {4000, 1}, {191, 193}}) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {1, 4000}, {4000, 1}, {191, 193}}) {
     const std::vector<float> plane(static_cast<size_t>(width) * static_cast<size_t>(height), 0.25f);
     const std::vector<QualityMap> maps = {{"normal", MapKind::kNormalXy, 2, false}};
     std::vector<PlanePair> planes(2);
