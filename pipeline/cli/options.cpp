@@ -60,6 +60,20 @@ void AddCommon(CLI::App* command, CommandLine* line, bool with_json) {
       ->check(CLI::IsMember({"auto", "avx2", "avx512"}));
 }
 
+// CLI::Range lets NaN pass.
+CLI::Range FiniteRange(double low, double high) {
+  CLI::Range range(low, high);
+  CLI::Validator& check = range;
+  check.operation([low, high](std::string& text) {
+    double value = 0;
+    if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
+    std::ostringstream out;
+    out << "Value " << text << " not in range " << low << " to " << high;
+    return out.str();
+  });
+  return range;
+}
+
 template <class T>
 CLI::Option* AddOverride(CLI::App* command, const std::string& name, std::optional<T>* value,
                          const std::string& help) {
@@ -84,23 +98,23 @@ void AddBake(CLI::App* app, CommandLine* line) {
       ->check(CLI::IsMember({"preview", "standard", "reference"}));
   AddOverride(command, "--target-psnr", &o.job.target_psnr_db,
               "Stop once the PSNR of mip 0 is there, in dB")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(FiniteRange(0.0, 100.0))
       ->type_name("DB");
   AddOverride(
       command, "--time-budget", &o.job.time_budget_s,
       "Aim to be done within so many seconds; the result then depends on the machine's speed")
-      ->check(CLI::Range(0.0, 1e6))
+      ->check(FiniteRange(0.0, 1e6))
       ->type_name("S");
   AddOverride(command, "--min-psnr", &o.job.min_psnr_db,
               "Quality gate: publish nothing below this overall PSNR, in dB, and exit with 4")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(FiniteRange(0.0, 100.0))
       ->type_name("DB");
   AddOverride(command, "--recipe", &o.job.recipe,
               "How to train: ours (default), or as Weinreich 2024 does")
       ->check(CLI::IsMember({"patina", "paper"}));
   AddOverride(command, "--samples", &o.job.samples,
               "Train with exactly so many samples, in place of --quality's choice")
-      ->check(CLI::Range(0.0, 1e12))
+      ->check(FiniteRange(0.0, 1e12))
       ->type_name("N");
   AddOverride(command, "--seed", &o.job.seed, "Seed of every random choice (default 1)")
       ->check(CLI::Range(uint64_t{0}, kMaxSeed))

@@ -248,7 +248,9 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
   InitFeaturesFromComponents(reference, result->shape, stats, pool, &store);
 
   const WindowDraw draw;
-  Trainer trainer(reference, result->shape, &store, &network, kernels, pool, options.seed, draw, kDefaultWindowsPerStep);
+  const TargetLevel& base = reference.pyramid.levels[0];
+  const int windows_per_step = WindowsPerStep(base.width, base.height);
+  Trainer trainer(reference, result->shape, &store, &network, kernels, pool, options.seed, draw, windows_per_step);
   Exporter exporter(&trainer, result->shape, &store, pool);
   session->Record(&trainer, &store, network.raw());
   network.Save();
@@ -289,7 +291,7 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
   if (!quick) exporter.Refine(0);
   // Coarse levels are few and their mips exact enough to feel every code: once more costs little.
   for (int pass = 0; pass < (quick ? 1 : kCoarsePasses); ++pass) exporter.Refine(1);
-  FinishNetwork(reference, kernels, pool, options, draw, kDefaultWindowsPerStep, kTuneShare * budget, kTuneRate, &exporter, &network, result);
+  FinishNetwork(reference, kernels, pool, options, draw, windows_per_step, kTuneShare * budget, kTuneRate, &exporter, &network, result);
 }
 
 // The recipe of Weinreich 2024, sections 5.1, 6.1: random start, free texels, then blocks; uniform s, batches of 512 x 512,

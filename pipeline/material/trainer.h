@@ -16,8 +16,8 @@
 
 namespace patina {
 
-// Windows between two network steps: about 32 thousand samples. Fewer leave threads waiting for each other.
-inline constexpr int kDefaultWindowsPerStep = 8;
+// Windows between two network steps. More keep threads from waiting for each other, fewer give small sources enough steps.
+inline int WindowsPerStep(int width, int height) { return static_cast<double>(width) * height >= 2e6 ? 8 : 4; }
 
 // How windows are drawn.
 struct WindowDraw {

@@ -209,7 +209,7 @@ void MeasureFullStep(SimdTarget target, int threads, const MaterialReference& re
     WindowDraw draw;
     if (on_grid) draw.off_grid_share = 0;
     Trainer trainer(reference, shape, &store, &network, KernelsFor(target), pool, 1, draw,
-                    kDefaultWindowsPerStep);
+                    WindowsPerStep(base.width, base.height));
     AdamRates features{
         .endpoint = 0.01f, .index = 0.01f, .beta1 = 0.8f, .beta2 = 0.99f, .epsilon = 1e-7f};
     AdamRates net{.endpoint = 1e-4f};
