@@ -27,7 +27,6 @@ BlockTables MakeTables() {
   for (int m = 0; m < bc6h::kModeCount; ++m) {
     const bc6h::ModeInfo& info = bc6h::Mode(m);
     ModeLimits& limits = tables.mode[m];
-    limits.bits = info.endpoint_bits;
     limits.max_code = static_cast<float>((1 << info.endpoint_bits) - 1);
     limits.offset = info.endpoint_bits >= 15 ? 0.0f : 0.5f;
     limits.step = std::ldexp(31.0f, -info.endpoint_bits);

@@ -9,7 +9,6 @@ namespace patina::bc6 {
 
 // The limits of a mode as the searches use them; whole numbers in floats.
 struct ModeLimits {
-  int bits;             // precision of the endpoint codes
   float max_code;       // 2^bits - 1
   float offset;         // code q stands for (q + offset) * step binades
   float step;           // binades between two codes

@@ -181,8 +181,8 @@ PATINA_INLINE unsigned LegalNeighbours(const ModeLimits& mode, const Codes& s, i
   return legal;
 }
 
-// Tries all steps of at most one code of both endpoints in the next channel, for both regions at
-// once and with new indices for each, and takes the best.
+// Tries all moves of one or both endpoints by `stride` codes in the next channel, for both regions
+// at once and with new indices for each, and takes the best.
 template <int kEntries>
 inline void StepChannel(const Problem& p, const BlockTables& tables, float stride, Codes* s) {
   constexpr int kRegions = kEntries == 8 ? 2 : 1;

@@ -41,6 +41,8 @@ TEST(Manifest, ReadingAndWritingAgainGivesTheSameBytes) {
   EXPECT_EQ(manifest->channels[5].range_min, 0.3f);
   EXPECT_EQ(manifest->channels[2].output, -1);
   EXPECT_EQ(manifest->channels[2].constant, 0.25f);
+  EXPECT_EQ(manifest->channels[4].scale, 1.0f);
+  EXPECT_EQ(manifest->channels[5].scale, 4.0f);
   EXPECT_TRUE(std::isinf(manifest->quality.psnr_mean_mips_db));
   EXPECT_TRUE(std::isinf(*manifest->quality.maps[0].mips[1].psnr_db));
   EXPECT_FALSE(manifest->quality.maps[0].overall.normal_deg.has_value());
@@ -191,6 +193,9 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRules) {
       {"/channels/1/output", [](Manifest* m) { m->channels[1].output = 5; }},
       {"/channels/0/range", [](Manifest* m) { m->channels[0].range_min = 2; }},
       {"/channels/0/range", [](Manifest* m) { m->channels[0].range_min = NAN; }},
+      {"/channels/5/scale", [](Manifest* m) { m->channels[5].scale = 0; }},
+      {"/channels/5/scale", [](Manifest* m) { m->channels[5].scale = INFINITY; }},
+      {"/channels/0/scale", [](Manifest* m) { m->channels[0].scale = 2; }},
       {"/channels/2/constant", [](Manifest* m) { m->channels[2].constant = INFINITY; }},
       {"/channels/3/component", [](Manifest* m) { m->channels[3].component = "z"; }},
       {"/channels/1", [](Manifest* m) { m->channels[1].component = "r"; }},

@@ -53,6 +53,7 @@ inline Manifest FullManifest() {
                        {"normal", "x", "normal_xy", 0, 1, 2, 0},
                        {"normal", "y", "normal_xy", 0, 1, 3, 0},
                        {"roughness", "", "linear", 0.3f, 1e-30f + 0.7f, 4, 0}};
+  manifest.channels.back().scale = 4;
   manifest.maps = {{"albedo", 0, {0, 1, 2}, "uint8", false, "srgb"},
                    {"roughness", 1, {1}, "half", true, "linear"},
                    {"normal", -1, {}, "uint16", false, "linear"}};
