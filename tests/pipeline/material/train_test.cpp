@@ -113,14 +113,16 @@ bool SameBytes(const TrainedMaterial& a, const TrainedMaterial& b) {
   return a.blocks == b.blocks && a.w1 == b.w1 && a.b1 == b.b1 && a.w2 == b.w2 && a.b2 == b.b2;
 }
 
-// The bound is looser than on real sets: what little noise a smooth material has is all that the export can lose.
-TEST(Train, LearnsASmoothMaterialAndExportsItWithinHalfADecibel) {
-  const auto reference = MakeReference(128, 128, 6, AddressMode::kWrap, Waves);
+// With the grain that photographed maps have; a perfectly smooth one would make every rounded code stand out.
+TEST(Train, LearnsAMaterialAndExportsItWithinATenthOfADecibel) {
+  Rng grain(4);
+  const auto reference = MakeReference(128, 128, 6, AddressMode::kWrap,
+                                       [&](double u, double v, int c) { return Waves(u, v, c) + 0.1f * (grain.Uniform() - 0.5f); });
   const TrainedMaterial material = MustTrain(reference, Samples(4e6), 2);
   ExpectLegalAndFinite(material);
-  EXPECT_GT(material.exported_psnr_mip0_db, 36);
-  EXPECT_GT(material.exported_psnr_mip0_db, material.float_psnr_mip0_db - 0.5);
-  EXPECT_GT(material.exported_psnr_off_grid_db, 34);
+  EXPECT_GT(material.exported_psnr_mip0_db, 29);
+  EXPECT_GT(material.exported_psnr_mip0_db, material.float_psnr_mip0_db - 0.1);
+  EXPECT_GT(material.exported_psnr_off_grid_db, 29);
 }
 
 TEST(Train, BeatsThePapersRecipeAtEqualSamples) {
