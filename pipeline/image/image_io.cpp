@@ -380,7 +380,8 @@ Status WriteOpened(OIIO::ImageOutput* output, const std::string& path, WriteForm
 
 // The library's PNG writer does not notice a full disk: a whole file ends in an IEND chunk.
 bool EndsAsPng(const std::string& path) {
-  static constexpr std::array<char, 12> kEnd = {0, 0, 0, 0, 'I', 'E', 'N', 'D', '\xAE', 'B', '\x60', '\x82'};
+  static constexpr std::array<char, 12> kEnd = {0,   0,   0,      0,   'I',    'E',
+                                                'N', 'D', '\xAE', 'B', '\x60', '\x82'};
   std::ifstream file(path, std::ios::binary);
   std::array<char, kEnd.size()> tail{};
   file.seekg(-static_cast<std::streamoff>(tail.size()), std::ios::end);
@@ -439,7 +440,8 @@ Status WriteImage(const std::string& path, WriteFormat format, int width, int he
     Status status = WriteOpened(output.get(), path, format, width, height, channels, values);
     output.reset();
     if (status && png && !EndsAsPng(path)) {
-      status = Fail(ErrorCode::kIo, path + ": the image was not written to its end; check space on the disk");
+      status = Fail(ErrorCode::kIo,
+                    path + ": the image was not written to its end; check space on the disk");
     }
     if (!status) {
       std::remove(path.c_str());
