@@ -104,9 +104,9 @@ SoftBlock FitTexels(const float texels[3][16]) {
   return block;
 }
 
-EncodedBlock Encode(const WeightedTarget& target, const SoftBlock& current) {
+EncodedBlock Encode(const WeightedTarget& target, const SoftBlock& current, Effort effort) {
   SearchResult found;
-  Kernels().encode(target, current, &found);
+  Kernels().encode(target, current, effort, &found);
   return Finish(found);
 }
 

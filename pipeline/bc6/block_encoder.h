@@ -35,6 +35,11 @@ struct WeightedTarget {
   alignas(64) float hessian[6][16];  // xx, xy, xz, yy, yz, zz; positive semidefinite for each texel
 };
 
+enum class Effort {
+  kQuick,  // half the time: one candidate descends to the end
+  kFull,
+};
+
 struct EncodedBlock {
   bc6h::BlockFields fields;  // what the bytes say
   bc6h::Block bytes = {};    // legal, decodable by anything
@@ -55,7 +60,8 @@ SoftBlock FitTexels(const float texels[3][16]);
 // endpoints refined by weighted least squares and by steps of up to three codes. The result is
 // never worse, in `error`, than current rounded into its best mode. Endpoints and partition of
 // `current` are clamped to their ranges; its indices are not used.
-EncodedBlock Encode(const WeightedTarget& target, const SoftBlock& current);
+EncodedBlock Encode(const WeightedTarget& target, const SoftBlock& current,
+                    Effort effort = Effort::kFull);
 
 // As Encode, keeping mode and partition of `current`: new endpoints and indices only. Never worse
 // than `current`, which must be legal (as unpacked or encoded).

@@ -20,6 +20,7 @@ inline constexpr int kExamined = 16;      // rounded fits whose exact error is t
 inline constexpr int kStarted = 8;        // of those, the ones that descend a little, ...
 inline constexpr int kContinued = 4;      // ... a little more, ...
 inline constexpr int kFinished = 3;       // ... and to the end,
+inline constexpr int kQuickStarted = 2;   // the same of a quick encode, which finishes one
 inline constexpr float kNearBest = 1.1f;  // if they are as near to the best as that
 inline constexpr int kFewSteps = 3;       // channels
 inline constexpr int kManySteps = 30;
@@ -329,17 +330,8 @@ inline int ExamineModes(const Problem& p, const BlockTables& tables, const Fits&
   return kExamined;
 }
 
-inline void EncodeKernel(const WeightedTarget& target, const bc6::SoftBlock& current,
-                         SearchResult* result) noexcept {
-  const BlockTables& tables = bc6::Tables();
-  const int partition = std::clamp(current.partition, 0, bc6h::kPartitionCount - 1);
-  Problem p;
-  PrepareProblem(target, &p);
-  Fits fits;
-  MakeFits(p, tables, current, partition, &fits);
-  Codes codes[kExamined];
-  ExamineModes(p, tables, fits, codes, &result->soft_partition);
-
+// From kExamined codes in order to the best of them, descended to the end, in front.
+inline void DescendByElimination(const Problem& p, const BlockTables& tables, Codes* codes) {
   int count = kStarted;
   for (int n = 0; n < count; ++n) Descend(p, tables, kFewSteps, &codes[n]);
   SortByError(codes, count);
@@ -352,6 +344,26 @@ inline void EncodeKernel(const WeightedTarget& target, const bc6::SoftBlock& cur
   ResolveAndDescend(p, tables, codes, count);
   SortByError(codes, count);
   DescendFurther(p, tables, &codes[0]);
+}
+
+inline void EncodeKernel(const WeightedTarget& target, const bc6::SoftBlock& current,
+                         bc6::Effort effort, SearchResult* result) noexcept {
+  const BlockTables& tables = bc6::Tables();
+  const int partition = std::clamp(current.partition, 0, bc6h::kPartitionCount - 1);
+  Problem p;
+  PrepareProblem(target, &p);
+  Fits fits;
+  MakeFits(p, tables, current, partition, &fits);
+  Codes codes[kExamined];
+  ExamineModes(p, tables, fits, codes, &result->soft_partition);
+
+  if (effort == bc6::Effort::kQuick) {
+    for (int n = 0; n < kQuickStarted; ++n) Descend(p, tables, kFewSteps, &codes[n]);
+    SortByError(codes, kQuickStarted);
+    Descend(p, tables, kManySteps, &codes[0]);
+  } else {
+    DescendByElimination(p, tables, codes);
+  }
   result->error = WriteFields(p, tables, codes[0], &result->fields);
 
   bc6h::BlockFields plain;

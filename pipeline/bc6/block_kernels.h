@@ -50,7 +50,7 @@ struct SearchResult {
 
 struct BlockKernels {
   void (*fit_texels)(const float texels[3][16], SoftBlock* block) noexcept;
-  void (*encode)(const WeightedTarget& target, const SoftBlock& current,
+  void (*encode)(const WeightedTarget& target, const SoftBlock& current, Effort effort,
                  SearchResult* result) noexcept;
   void (*refine)(const WeightedTarget& target, const bc6h::BlockFields& current,
                  SearchResult* result) noexcept;
