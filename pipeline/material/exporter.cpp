@@ -58,6 +58,25 @@ void SoftTexels(const bc6::SoftBlock& soft, float out[3][16]) {
   }
 }
 
+// What a block should become: each texel's Newton step by `planes` from its value now, and what a deviation costs.
+bc6::WeightedTarget WantedBlock(const float* planes, const FeatureLevel& level, int bx, int by, double step, const float texels[3][16]) {
+  const size_t plane = static_cast<size_t>(level.width) * level.height;
+  bc6::WeightedTarget target;
+  for (int k = 0; k < 16; ++k) {
+    const int x = 4 * bx + (k & 3), y = 4 * by + (k >> 2);
+    float sums[9] = {};
+    const float value[3] = {texels[0][k], texels[1][k], texels[2][k]};
+    if (x < level.width && y < level.height) {
+      for (int c = 0; c < 9; ++c) sums[c] = planes[c * plane + static_cast<size_t>(y) * level.width + x];
+    }
+    float shift[3];
+    WantedShift(sums, step, value, shift);
+    for (int c = 0; c < 3; ++c) target.value[c][k] = value[c] + shift[c];
+    for (int c = 0; c < 6; ++c) target.hessian[c][k] = sums[3 + c];
+  }
+  return target;
+}
+
 }  // namespace
 
 Exporter::Exporter(Trainer* trainer, const ModelShape& shape, FeatureStore* store, ThreadPool& pool)
@@ -83,22 +102,14 @@ void Exporter::StoreEncoded(const bc6::EncodedBlock& encoded, int texture, int l
 }
 
 template <class EncodeBlock>
-void Exporter::PassTexture(int texture, int first_level, bool refining, EncodeBlock&& encode) {
+void Exporter::PassTexture(int texture, int first_level, bool guarded_pass, EncodeBlock&& encode) {
   AlignedBuffer<float> planes;
   for (int l = first_level; l < shape_[texture].levels; ++l) {
     trainer_->Sensitivity(texture, l, &planes);
-    FeatureLevel& level = store_->textures[texture][l];
-    const size_t plane = static_cast<size_t>(level.width) * level.height;
-    const bool guarded = refining && l > 0;
+    const FeatureLevel& level = store_->textures[texture][l];
+    const bool guarded = guarded_pass && l > 0;
     const double error_before = guarded ? trainer_->MipError(shape_[texture].lod_shift + l) : 0;
-    LevelFields fields_before;
-    std::vector<bc6h::Block> blocks_before;
-    std::vector<float> params_before;
-    if (guarded) {
-      fields_before = fields_[texture][l];
-      blocks_before = blocks_[texture][l];
-      params_before.assign(level.params.data(), level.params.data() + level.params.size());
-    }
+    const LevelState before = guarded ? SaveLevel(texture, l) : LevelState{};
     const double step = l == 0 && texture < 3 ? kFineStep : 1.0;
     pool_.ParallelFor(level.blocks_y, [&](int by, int) {
       for (int bx = 0; bx < level.blocks_x; ++bx) {
@@ -106,34 +117,32 @@ void Exporter::PassTexture(int texture, int first_level, bool refining, EncodeBl
         const bc6::SoftBlock current = LoadSoftBlock(level, block);
         float texels[3][16];
         SoftTexels(current, texels);
-        bc6::WeightedTarget target;
-        for (int k = 0; k < 16; ++k) {
-          const int x = 4 * bx + (k & 3), y = 4 * by + (k >> 2);
-          float sums[9] = {};
-          const float value[3] = {texels[0][k], texels[1][k], texels[2][k]};
-          if (x < level.width && y < level.height) {
-            for (int c = 0; c < 9; ++c) sums[c] = planes[c * plane + static_cast<size_t>(y) * level.width + x];
-          }
-          float shift[3];
-          WantedShift(sums, step, value, shift);
-          for (int c = 0; c < 3; ++c) target.value[c][k] = value[c] + shift[c];
-          for (int c = 0; c < 6; ++c) target.hessian[c][k] = sums[3 + c];
-        }
-        StoreEncoded(encode(target, current, fields_[texture][l][block]), texture, l, block);
+        StoreEncoded(encode(WantedBlock(planes.data(), level, bx, by, step, texels), current, fields_[texture][l][block]), texture, l, block);
       }
     });
-    if (guarded && trainer_->MipError(shape_[texture].lod_shift + l) > error_before) {
-      fields_[texture][l] = std::move(fields_before);
-      blocks_[texture][l] = std::move(blocks_before);
-      std::copy(params_before.begin(), params_before.end(), level.params.data());
-    }
+    if (guarded && trainer_->MipError(shape_[texture].lod_shift + l) > error_before) RestoreLevel(texture, l, before);
   }
 }
 
-void Exporter::Encode() {
+Exporter::LevelState Exporter::SaveLevel(int texture, int level_index) const {
+  const FeatureLevel& level = store_->textures[texture][level_index];
+  return {fields_[texture][level_index], blocks_[texture][level_index],
+          std::vector<float>(level.params.data(), level.params.data() + level.params.size()),
+          std::vector<uint8_t>(level.partition.data(), level.partition.data() + level.partition.size())};
+}
+
+void Exporter::RestoreLevel(int texture, int level_index, const LevelState& state) {
+  FeatureLevel& level = store_->textures[texture][level_index];
+  fields_[texture][level_index] = state.fields;
+  blocks_[texture][level_index] = state.blocks;
+  std::copy(state.params.begin(), state.params.end(), level.params.data());
+  std::copy(state.partition.begin(), state.partition.end(), level.partition.data());
+}
+
+void Exporter::Encode(bc6::Effort effort) {
   for (int t = 0; t < kFeatureTextures; ++t) {
-    PassTexture(t, 0, false, [](const bc6::WeightedTarget& target, const bc6::SoftBlock& current, const bc6h::BlockFields&) {
-      return bc6::Encode(target, current);
+    PassTexture(t, 0, false, [effort](const bc6::WeightedTarget& target, const bc6::SoftBlock& current, const bc6h::BlockFields&) {
+      return bc6::Encode(target, current, effort);
     });
   }
   store_->ResetMoments();
@@ -208,16 +217,48 @@ std::array<std::vector<std::vector<bc6h::Block>>, kFeatureTextures> Exporter::Ta
 void Exporter::DecodeTo(FeatureStore* free_store) const {
   free_store->Allocate(shape_, BlockForm::kFree, StoreUse::kFixed);
   for (int t = 0; t < kFeatureTextures; ++t) {
-    for (int l = 0; l < shape_[t].levels; ++l) {
-      FeatureLevel& level = free_store->textures[t][l];
-      pool_.ParallelFor(level.blocks_y, [&](int by, int) {
-        for (int bx = 0; bx < level.blocks_x; ++bx) {
-          const int block = by * level.blocks_x + bx;
+    for (int l = 0; l < shape_[t].levels; ++l) DecodeLevel(t, l, free_store);
+  }
+}
+
+void Exporter::DecodeLevel(int texture, int level_index, FeatureStore* free_store) const {
+  FeatureLevel& level = free_store->textures[texture][level_index];
+  pool_.ParallelFor(level.blocks_y, [&](int by, int) {
+    for (int bx = 0; bx < level.blocks_x; ++bx) {
+      const int block = by * level.blocks_x + bx;
+      float texels[3][16];
+      bc6::DecodeToFloat(fields_[texture][level_index][block], texels);
+      std::memcpy(level.params.data() + static_cast<size_t>(block) * BlockStride(BlockForm::kFree), texels, sizeof texels);
+    }
+  });
+}
+
+void Exporter::Polish(int rounds, Trainer* exact, FeatureStore* decoded) {
+  AlignedBuffer<float> planes;
+  for (int round = 0; round < rounds; ++round) {
+    for (int t = 0; t < kFeatureTextures; ++t) {
+      for (int l = 1; l < shape_[t].levels; ++l) {
+        FeatureLevel& level = decoded->textures[t][l];
+        if (level.block_count() > kPolishedBlocks) continue;
+        const int mip = shape_[t].lod_shift + l;
+        exact->Sensitivity(t, l, &planes);
+        const double error_before = exact->MipError(mip);
+        const LevelState before = SaveLevel(t, l);
+        pool_.ParallelFor(level.block_count(), [&](int block, int) {
           float texels[3][16];
-          bc6::DecodeToFloat(fields_[t][l][block], texels);
-          std::memcpy(level.params.data() + static_cast<size_t>(block) * BlockStride(BlockForm::kFree), texels, sizeof texels);
+          std::memcpy(texels, level.params.data() + static_cast<size_t>(block) * BlockStride(BlockForm::kFree), sizeof texels);
+          const bc6::WeightedTarget target =
+              WantedBlock(planes.data(), level, block % level.blocks_x, block / level.blocks_x, 1.0, texels);
+          StoreEncoded(round % 2 == 0 ? bc6::Encode(target, LoadSoftBlock(store_->textures[t][l], block))
+                                      : bc6::Refine(target, fields_[t][l][block]),
+                       t, l, block);
+        });
+        DecodeLevel(t, l, decoded);
+        if (exact->MipError(mip) > error_before) {
+          RestoreLevel(t, l, before);
+          DecodeLevel(t, l, decoded);
         }
-      });
+      }
     }
   }
 }

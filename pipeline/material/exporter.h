@@ -22,7 +22,7 @@ class Exporter {
 
   // Re-encodes all blocks with free choice of mode and partition; the store's parameters become those of the legal blocks
   // and the optimiser's state is reset. After it fields() and blocks() are valid.
-  void Encode();
+  void Encode(bc6::Effort effort);
   // The same with mode and partition kept, for levels first_level and up. Needs a preceding Encode.
   void Refine(int first_level);
   // The paper's export: 6-bit absolute endpoints and 3-bit indices, each rounded to the nearest; mode 0x1E only.
@@ -33,10 +33,26 @@ class Exporter {
   // Exactly what a decoder gives for the last pass, as a store of form kFree.
   void DecodeTo(FeatureStore* free_store) const;
 
+  // The last word on levels of 1 and above with few blocks, whose mips are exact enough to feel every code and every rounded
+  // weight: rounds of encoding and refining in turn, judged by the values of a decoder and the network that is written.
+  // `exact` trains on `decoded`, which is what DecodeTo gave; both stay in step with the blocks.
+  void Polish(int rounds, Trainer* exact, FeatureStore* decoded);
+
  private:
+  static constexpr int kPolishedBlocks = 256;
+
   using LevelFields = std::vector<bc6h::BlockFields>;
+  struct LevelState {
+    LevelFields fields;
+    std::vector<bc6h::Block> blocks;
+    std::vector<float> params;
+    std::vector<uint8_t> partition;
+  };
+  LevelState SaveLevel(int texture, int level) const;
+  void RestoreLevel(int texture, int level, const LevelState& state);
+  void DecodeLevel(int texture, int level, FeatureStore* free_store) const;
   template <class EncodeBlock>
-  void PassTexture(int texture, int first_level, bool refining, EncodeBlock&& encode);
+  void PassTexture(int texture, int first_level, bool guarded_pass, EncodeBlock&& encode);
   void StoreEncoded(const bc6::EncodedBlock& encoded, int texture, int level, int block);
 
   Trainer* trainer_;
