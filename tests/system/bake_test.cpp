@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "formats/schema_check.h"
 #include "pipeline/image/image_io.h"
@@ -487,17 +488,33 @@ TEST(Run, ASecondBakeOfTheSameAssetIsRefusedWhileTheFirstRuns) {
 
 // ---- containers back ----
 
-TEST(Unpack, GivesMapsThatTheContainerAgreesWith) {
+// A sample of 64 x 64 and its container, baked once. The tests only read them.
+class Baked : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared_ = new TempFolder;
+    MakeSample(*shared_ / "floor");
+    const Outcome baked =
+        Patina(Preview({"bake", *shared_ / "floor", "--out", *shared_ / "out", "--json"}));
+    ASSERT_EQ(baked.exit_code, 0) << baked.err;
+    result_ = LastLine(baked.out);
+  }
+  static void TearDownTestSuite() { delete std::exchange(shared_, nullptr); }
+
+  static std::string Source() { return *shared_ / "floor"; }
+  static std::string Asset() { return *shared_ / "out/floor"; }
+  static const Json& Measured() { return result_; }
+
+ private:
+  static inline TempFolder* shared_ = nullptr;
+  static inline Json result_;
+};
+
+TEST_F(Baked, UnpacksToMapsThatTheContainerAgreesWith) {
   TempFolder folder;
-  MakeSample(folder / "floor", 64);
-  ASSERT_EQ(
-      Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q", "--no-toksvig"}))
-          .exit_code,
-      0);
   for (const char* format : {"png", "exr"}) {
     const std::string maps = folder / (std::string("maps_") + format);
-    const Outcome unpacked =
-        Patina({"unpack", folder / "out/floor", "--out", maps, "--format", format});
+    const Outcome unpacked = Patina({"unpack", Asset(), "--out", maps, "--format", format});
     ASSERT_EQ(unpacked.exit_code, 0) << unpacked.err;
     for (const char* role :
          {"albedo", "normal", "ao", "roughness", "metalness", "displacement", "emissive"}) {
@@ -517,8 +534,7 @@ TEST(Unpack, GivesMapsThatTheContainerAgreesWith) {
     }
   }
   // Only the rounding to 8 bits lies between the container and its own maps.
-  const Outcome compared =
-      Patina({"compare", folder / "out/floor", folder / "maps_png", "--json", "-q"});
+  const Outcome compared = Patina({"compare", Asset(), folder / "maps_png", "--json", "-q"});
   ASSERT_EQ(compared.exit_code, 0) << compared.err;
   const Json json = LastLine(compared.out);
   EXPECT_GT(json["psnr"]["mip0"], 55) << json;
@@ -527,31 +543,21 @@ TEST(Unpack, GivesMapsThatTheContainerAgreesWith) {
   EXPECT_TRUE(json["not_compared"].empty());
 }
 
-TEST(Unpack, KnowsTheMipsThereAre) {
+TEST_F(Baked, KnowsTheMipsThereAre) {
   TempFolder folder;
-  MakeSample(folder / "floor", 32);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code,
-            0);
-  ASSERT_EQ(
-      Patina({"unpack", folder / "out/floor", "--out", folder / "maps", "--mip", "5"}).exit_code,
-      0);
+  ASSERT_EQ(Patina({"unpack", Asset(), "--out", folder / "maps", "--mip", "6"}).exit_code, 0);
   auto info = ReadImageInfo(folder / "maps/albedo.png");
   ASSERT_TRUE(info);
   EXPECT_EQ(info->width, 1);
-  const Outcome beyond =
-      Patina({"unpack", folder / "out/floor", "--out", folder / "maps", "--mip", "6"});
+  const Outcome beyond = Patina({"unpack", Asset(), "--out", folder / "maps", "--mip", "7"});
   EXPECT_EQ(beyond.exit_code, 3);
-  EXPECT_THAT(beyond.err, HasSubstr("0 to 5"));
+  EXPECT_THAT(beyond.err, HasSubstr("0 to 6"));
 }
 
-TEST(Compare, MeasuresWhatTheManifestSays) {
+TEST_F(Baked, ComparesAsItWasMeasured) {
   TempFolder folder;
-  MakeSample(folder / "floor", 64);
-  const Outcome baked =
-      Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--json"}));
-  ASSERT_EQ(baked.exit_code, 0);
-  const Json expected = LastLine(baked.out);
-  const Outcome compared = Patina({"compare", folder / "out/floor", folder / "floor", "--json"});
+  const Json& expected = Measured();
+  const Outcome compared = Patina({"compare", Asset(), Source(), "--json"});
   ASSERT_EQ(compared.exit_code, 0) << compared.err;
   const Json json = LastLine(compared.out);
   EXPECT_EQ(json["psnr"], expected["psnr"]);
@@ -559,24 +565,21 @@ TEST(Compare, MeasuresWhatTheManifestSays) {
   EXPECT_EQ(json["flip"], expected["flip"]);
   EXPECT_EQ(json["same_source"], true);
   MakeSample(folder / "other", 32);
-  const Outcome other = Patina({"compare", folder / "out/floor", folder / "other"});
+  const Outcome other = Patina({"compare", Asset(), folder / "other"});
   EXPECT_EQ(other.exit_code, 3);
   EXPECT_THAT(other.err, HasSubstr("64 x 64"));
 }
 
-TEST(Info, DescribesTheCurrentContainer) {
+TEST_F(Baked, DescribesItself) {
   TempFolder folder;
-  MakeSample(folder / "floor", 32);
-  ASSERT_EQ(Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "-q"})).exit_code,
-            0);
-  const Outcome text = Patina({"info", folder / "out/floor"});
+  const Outcome text = Patina({"info", Asset()});
   EXPECT_EQ(text.exit_code, 0);
   for (const char* word :
-       {"32 x 32", "bcf-1k", "albedo", "features_0.dds", "mosaic_floor_arm.png", "r0001"}) {
+       {"64 x 64", "bcf-1k", "albedo", "features_0.dds", "mosaic_floor_arm.png", "r0001"}) {
     EXPECT_THAT(text.out, HasSubstr(word));
   }
-  const Json json = LastLine(Patina({"info", folder / "out/floor/current", "--json"}).out);
-  EXPECT_EQ(json["manifest"], Json::parse(ReadAll(folder / "out/floor/current/manifest.json")));
+  const Json json = LastLine(Patina({"info", Asset() + "/current", "--json"}).out);
+  EXPECT_EQ(json["manifest"], Json::parse(ReadAll(Asset() + "/current/manifest.json")));
   EXPECT_GT(json["bytes"], 1000);
 }
 
