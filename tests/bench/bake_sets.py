@@ -165,7 +165,7 @@ def bake(options, set_path, variant, samples):
         answer = json.loads(lines[-1]) if lines else {}
     except ValueError:
         answer = {}
-    results = answer.get("results", [answer]) if answer else []
+    results = answer.get("assets", [answer]) if answer else []
     if not results:
         error = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
         results = [{"asset": os.path.basename(set_path), "error": {"message": error[0]}}]
