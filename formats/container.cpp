@@ -296,6 +296,18 @@ Result<Container> OpenContainer(const std::string& path) {
 }
 
 Status VerifyPayloads(const Container& container) {
+  if (container.manifest.brdf && !container.manifest.brdf->shared_codebook_file.empty()) {
+    const ManifestBrdf& brdf = *container.manifest.brdf;
+    // Beside the pack, or in the folder that holds the assets.
+    std::string path = container.PathOf(brdf.shared_codebook_file);
+    std::error_code ignored;
+    if (!fs::exists(path, ignored)) path = container.PathOf("../../" + brdf.shared_codebook_file);
+    PATINA_ASSIGN(const FileDigest digest, Sha256OfFile(path));
+    if (digest.sha256 != brdf.shared_codebook_sha256) {
+      return Fail(ErrorCode::kCorruptData,
+                  path + " does not match its SHA-256 in the manifest; bake or copy it again");
+    }
+  }
   for (const ManifestPayload& payload : container.manifest.payloads) {
     const std::string path = container.PathOf(payload.name);
     PATINA_ASSIGN(const FileDigest digest, Sha256OfFile(path));

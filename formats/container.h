@@ -83,7 +83,8 @@ struct Container {
 // manifest.json. Errors: kNotFound, kIo, and those of ParseManifest; they name the file.
 Result<Container> OpenContainer(const std::string& path);
 
-// Checks presence, size and SHA-256 of every payload. Errors: kNotFound, kCorruptData, kIo; they
+// Checks presence, size and SHA-256 of every payload, and of a codebook that a BRDF shares with
+// others. Errors: kNotFound, kCorruptData, kIo; they
 // name the file.
 Status VerifyPayloads(const Container& container);
 

@@ -1,10 +1,12 @@
 #include "formats/manifest.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "formats/dds.h"
+#include "formats/index_pack.h"
 #include "formats/json_view.h"
 #include "formats/manifest_check.h"
 
@@ -173,6 +175,61 @@ ordered_json TrainingToJson(const ManifestTraining& training) {
   return json;
 }
 
+ordered_json BrdfSourceToJson(const ManifestBrdf& brdf) {
+  ordered_json json;
+  json["format"] = brdf.source_format;
+  json["cells"] = brdf.cells;
+  json["invalid_cells"] = brdf.invalid_cells;
+  json["files"] = ordered_json::array();
+  for (const ManifestBrdfFile& file : brdf.files) {
+    ordered_json entry;
+    entry["path"] = file.path;
+    entry["sha256"] = file.sha256;
+    json["files"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+ordered_json BrdfToJson(const ManifestBrdf& brdf) {
+  ordered_json json;
+  json["grid"] = brdf.grid;
+  if (!brdf.codebook.empty()) json["codebook"]["payload"] = brdf.codebook;
+  if (!brdf.shared_codebook_file.empty()) {
+    json["codebook"]["file"] = brdf.shared_codebook_file;
+    json["codebook"]["sha256"] = brdf.shared_codebook_sha256;
+  }
+  json["nside"] = brdf.nside;
+  json["primitive_size"] = brdf.primitive_size;
+  json["index_bits"] = brdf.index_bits;
+  json["interpolation"] = brdf.interpolation;
+  json["isotropic"] = brdf.isotropic;
+  json["canonical_order"] = brdf.canonical_order;
+  json["angle_inputs"] = brdf.angle_inputs;
+  json["network"]["payload"] = brdf.network;
+  json["network"]["layers"] = brdf.layers;
+  json["network"]["activation"] = brdf.activation;
+  json["output_transform"] = brdf.output_transform;
+  if (!brdf.sampler.empty()) json["sampler"] = brdf.sampler;
+  return json;
+}
+
+ordered_json BrdfQualityToJson(const ManifestBrdfQuality& quality) {
+  ordered_json json = ordered_json::object();
+  if (quality.image_mae) json["image_mae"] = *quality.image_mae;
+  if (quality.image_rmse) json["image_rmse"] = *quality.image_rmse;
+  if (quality.image_ssim) json["image_ssim"] = *quality.image_ssim;
+  if (quality.log1p_mse) json["log1p_mse"] = *quality.log1p_mse;
+  if (quality.reciprocity_error) json["reciprocity_error"] = *quality.reciprocity_error;
+  json["albedo"] = ordered_json::array();
+  for (const ManifestAlbedo& albedo : quality.albedo) {
+    ordered_json entry;
+    entry["theta_deg"] = albedo.theta_deg;
+    entry["rgb"] = albedo.rgb;
+    json["albedo"].push_back(std::move(entry));
+  }
+  return json;
+}
+
 constexpr size_t kMaxEntries = 65536;
 
 ManifestSource ReadSource(const JsonView& json) {
@@ -326,6 +383,75 @@ ManifestTraining ReadTraining(const JsonView& json) {
   return training;
 }
 
+void ReadBrdfSource(const JsonView& json, ManifestBrdf* brdf) {
+  brdf->source_format = json.Field("format").String();
+  brdf->cells = json.Field("cells").Unsigned();
+  brdf->invalid_cells = json.Field("invalid_cells").Unsigned();
+  json.Field("files").ForEach(kMaxEntries, [&](const JsonView& entry) {
+    brdf->files.push_back({entry.Field("path").String(), entry.Field("sha256").String()});
+  });
+}
+
+void ReadBrdfModel(const JsonView& json, ManifestBrdf* brdf) {
+  brdf->grid = json.Field("grid").String();
+  if (const JsonView codebook = json.Optional("codebook")) {
+    if (const JsonView payload = codebook.Optional("payload")) {
+      brdf->codebook = payload.String();
+    } else {
+      brdf->shared_codebook_file = codebook.Field("file").String();
+      brdf->shared_codebook_sha256 = codebook.Field("sha256").String();
+    }
+  }
+  brdf->nside = json.Field("nside").Int(1, healpix::kMaxNside);
+  brdf->primitive_size = json.Field("primitive_size").Int(1, kMaxPrimitiveSize);
+  brdf->index_bits = json.Field("index_bits").Int(1, kMaxIndexBits);
+  brdf->interpolation = json.Field("interpolation").String();
+  brdf->isotropic = json.Field("isotropic").Bool();
+  brdf->canonical_order = json.Field("canonical_order").Bool();
+  brdf->angle_inputs = json.Field("angle_inputs").Bool();
+  const JsonView network = json.Field("network");
+  brdf->network = network.Field("payload").String();
+  network.Field("layers").ForEach(kMaxManifestLayers + 1, [&](const JsonView& width) {
+    brdf->layers.push_back(width.Int(1, kMaxManifestLayerWidth));
+  });
+  brdf->activation = network.Field("activation").String();
+  brdf->output_transform = json.Field("output_transform").String();
+  if (const JsonView sampler = json.Optional("sampler")) brdf->sampler = sampler.String();
+}
+
+void ReadBrdfQuality(const JsonView& json, JsonProblem* problem, ManifestBrdfQuality* quality) {
+  quality->image_mae = ReadOptionalNumber(json.Optional("image_mae"));
+  quality->image_rmse = ReadOptionalNumber(json.Optional("image_rmse"));
+  quality->image_ssim = ReadOptionalNumber(json.Optional("image_ssim"));
+  quality->log1p_mse = ReadOptionalNumber(json.Optional("log1p_mse"));
+  quality->reciprocity_error = ReadOptionalNumber(json.Optional("reciprocity_error"));
+  json.Field("albedo").ForEach(kMaxEntries, [&](const JsonView& entry) {
+    ManifestAlbedo albedo;
+    albedo.theta_deg = entry.Field("theta_deg").Number();
+    std::vector<double> rgb;
+    entry.Field("rgb").ForEach(3, [&](const JsonView& value) { rgb.push_back(value.Number()); });
+    if (rgb.size() == 3) {
+      std::copy(rgb.begin(), rgb.end(), albedo.rgb.begin());
+    } else if (problem->text.empty()) {
+      problem->text =
+          "/quality/albedo/" + std::to_string(quality->albedo.size()) + "/rgb: not three numbers";
+    }
+    quality->albedo.push_back(albedo);
+  });
+}
+
+ordered_json LeftOutToJson(const std::vector<ManifestLeftOut>& left_outs) {
+  ordered_json json = ordered_json::array();
+  for (const ManifestLeftOut& left_out : left_outs) {
+    ordered_json entry;
+    entry["what"] = left_out.what;
+    entry["reason"] = left_out.reason;
+    entry["saved"] = left_out.saved;
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
 Status CheckVersion(const JsonView& json, const JsonProblem& problem) {
   const std::string format = json.Field("format").String();
   if (problem.text.empty() && format != kFormatName) {
@@ -339,6 +465,11 @@ Status CheckVersion(const JsonView& json, const JsonProblem& problem) {
                                              " is newer than this program, which reads up to " +
                                              std::to_string(kManifestVersion) +
                                              "; use a newer patina");
+  }
+  const std::string kind = json.Field("kind").String();
+  if (problem.text.empty() && kind != "material" && kind != "brdf") {
+    return Fail(ErrorCode::kUnsupported,
+                "/kind: " + QuoteForMessage(kind) + " is not one of: material, brdf");
   }
   return {};
 }
@@ -360,25 +491,26 @@ Result<std::string> ToJson(const Manifest& manifest) {
   json["tool"]["recipe_version"] = manifest.tool.recipe_version;
   json["fingerprint"] = manifest.fingerprint;
   json["seed"] = manifest.seed;
-  json["profile"] = manifest.profile;
+  if (!manifest.brdf) json["profile"] = manifest.profile;
   json["quality_setting"] = manifest.quality_setting;
-  json["source"] = SourceToJson(manifest.source);
+  json["source"] = manifest.brdf ? BrdfSourceToJson(*manifest.brdf) : SourceToJson(manifest.source);
   json["payloads"] = PayloadsToJson(manifest.payloads);
-  json["features"] = FeaturesToJson(manifest.features);
-  if (manifest.network) json["network"] = NetworkToJson(*manifest.network);
-  json["channels"] = ChannelsToJson(manifest.channels);
-  json["maps"] = MapsToJson(manifest.maps);
-  json["color"]["working_space"] = manifest.working_space;
-  json["quality"] = QualityToJson(manifest.quality);
-  json["training"] = TrainingToJson(manifest.training);
-  json["left_out"] = ordered_json::array();
-  for (const ManifestLeftOut& left_out : manifest.left_out) {
-    ordered_json entry;
-    entry["what"] = left_out.what;
-    entry["reason"] = left_out.reason;
-    entry["saved"] = left_out.saved;
-    json["left_out"].push_back(std::move(entry));
+  if (manifest.brdf) {
+    json["brdf"] = BrdfToJson(*manifest.brdf);
+  } else {
+    json["features"] = FeaturesToJson(manifest.features);
+    if (manifest.network) json["network"] = NetworkToJson(*manifest.network);
+    json["channels"] = ChannelsToJson(manifest.channels);
+    json["maps"] = MapsToJson(manifest.maps);
   }
+  json["color"]["working_space"] = manifest.working_space;
+  if (manifest.brdf) {
+    json["quality"] = BrdfQualityToJson(manifest.brdf->quality);
+  } else {
+    json["quality"] = QualityToJson(manifest.quality);
+    json["training"] = TrainingToJson(manifest.training);
+  }
+  json["left_out"] = LeftOutToJson(manifest.left_out);
   json["warnings"] = manifest.warnings;
   std::string text = json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
   // What is written must be readable: this also finds strings and lists above the reader's limits.
@@ -413,17 +545,24 @@ Result<Manifest> ParseManifest(std::string_view text) {
   manifest.tool.recipe_version = tool.Field("recipe_version").Int(1, 1000000);
   manifest.fingerprint = json.Field("fingerprint").String();
   manifest.seed = json.Field("seed").Unsigned();
-  manifest.profile = json.Field("profile").String();
   manifest.quality_setting = json.Field("quality_setting").String();
-  manifest.source = ReadSource(json.Field("source"));
   ReadPayloads(json.Field("payloads"), &manifest.payloads);
-  ReadFeatures(json.Field("features"), &manifest.features);
-  if (const JsonView network = json.Optional("network")) manifest.network = ReadNetwork(network);
-  ReadChannels(json.Field("channels"), &problem, &manifest.channels);
-  ReadMaps(json.Field("maps"), &manifest.maps);
   manifest.working_space = json.Field("color").Field("working_space").String();
-  manifest.quality = ReadQuality(json.Field("quality"));
-  manifest.training = ReadTraining(json.Field("training"));
+  if (manifest.kind == "brdf") {
+    manifest.brdf.emplace();
+    ReadBrdfSource(json.Field("source"), &*manifest.brdf);
+    ReadBrdfModel(json.Field("brdf"), &*manifest.brdf);
+    ReadBrdfQuality(json.Field("quality"), &problem, &manifest.brdf->quality);
+  } else {
+    manifest.profile = json.Field("profile").String();
+    manifest.source = ReadSource(json.Field("source"));
+    ReadFeatures(json.Field("features"), &manifest.features);
+    if (const JsonView network = json.Optional("network")) manifest.network = ReadNetwork(network);
+    ReadChannels(json.Field("channels"), &problem, &manifest.channels);
+    ReadMaps(json.Field("maps"), &manifest.maps);
+    manifest.quality = ReadQuality(json.Field("quality"));
+    manifest.training = ReadTraining(json.Field("training"));
+  }
   json.Field("left_out").ForEach(kMaxEntries, [&](const JsonView& entry) {
     manifest.left_out.push_back({entry.Field("what").String(), entry.Field("reason").String(),
                                  entry.Field("saved").String()});

@@ -21,6 +21,8 @@ inline constexpr size_t kMaxManifestBytes = size_t{8} << 20;  // readers refuse 
 inline constexpr int kMaxManifestFeatures = 16;
 inline constexpr int kMaxManifestHidden = 256;
 inline constexpr int kMaxManifestOutputs = 256;
+inline constexpr int kMaxManifestLayerWidth = 512;  // of a BRDF's network
+inline constexpr int kMaxManifestLayers = 16;
 
 struct ManifestTool {
   std::string name = "patina";
@@ -56,7 +58,7 @@ struct ManifestSource {
 // are not listed.
 struct ManifestPayload {
   std::string name;  // a plain file name in the container's directory
-  std::string role;  // "features", "weights", "preview", "report"
+  std::string role;  // "features", "grid", "codebook", "weights", "sampler", "preview", "report"
   uint64_t bytes = 0;
   std::string sha256;
 };
@@ -90,7 +92,7 @@ struct ManifestChannel {
   float range_max = 1;
   int output = -1;     // output of the network, or -1 for a constant
   float constant = 0;  // coded; used when output < 0
-  float scale = 1;      // of "linear": physical value = coded value * scale; > 0
+  float scale = 1;     // of "linear": physical value = coded value * scale; > 0
 };
 
 // How a map was stored in the source, so that it can be written back the same way.
@@ -154,25 +156,78 @@ struct ManifestLeftOut {
   std::string saved;   // e.g. "1 network output"
 };
 
+// One input file of a BRDF.
+struct ManifestBrdfFile {
+  std::string path;    // relative to the input folder, '/' between folders, UTF-8
+  std::string sha256;  // 64 lower-case hex digits
+};
+
+// The directional albedo of the decoded BRDF: the integral of f cos(theta_o) over wo.
+struct ManifestAlbedo {
+  double theta_deg = 0;                   // colatitude of wi
+  std::array<double, 3> rgb = {0, 0, 0};  // above 1 where the BRDF does not conserve energy
+};
+
+// Measured on the written payloads; what was not measured is absent. FORMATS.md says how.
+struct ManifestBrdfQuality {
+  std::optional<double> image_mae;          // of the lit sphere, sRGB
+  std::optional<double> image_rmse;         // likewise
+  std::optional<double> image_ssim;         // likewise
+  std::optional<double> log1p_mse;          // of log(1 + f) over the raw samples
+  std::optional<double> reciprocity_error;  // mean |f(wi, wo) - f(wo, wi)| over their mean
+  std::vector<ManifestAlbedo> albedo;
+};
+
+// What a container of kind "brdf" has instead of textures, channels and maps.
+struct ManifestBrdf {
+  // The source.
+  std::string source_format;   // "merl", "rgl", "utia", "sparse", ...
+  uint64_t cells = 0;          // colours in the file
+  uint64_t invalid_cells = 0;  // of those, the ones that were left out
+  std::vector<ManifestBrdfFile> files;
+  // The model; what repeats the index pack's header is the same as there.
+  std::string grid;      // name of the payload of role "grid"
+  std::string codebook;  // of the payload of role "codebook", if it is a file of this container
+  // If several containers share it: a plain file name in the folder that holds the assets. With
+  // neither of the two the codebook is in the grid's file.
+  std::string shared_codebook_file;
+  std::string shared_codebook_sha256;
+  int nside = 64;
+  int primitive_size = 16;
+  int index_bits = 9;
+  std::string interpolation = "bilinear";  // "bilinear", "inverse_distance", "uniform"
+  bool isotropic = true;
+  bool canonical_order = true;
+  bool angle_inputs = true;
+  std::string network;                     // name of the payload of role "weights"
+  std::vector<int> layers;                 // widths: inputs, hidden ..., 3 outputs
+  std::string activation = "relu";         // between layers
+  std::string output_transform = "expm1";  // f = max(0, exp(min(y, 12)) - 1)
+  std::string sampler;                     // of the payload of role "sampler"; empty if none
+  ManifestBrdfQuality quality;
+};
+
+// Fields marked [material] are absent from the file of another kind and then have their defaults.
 struct Manifest {
   // format "patina-container" and format_version kManifestVersion are written by ToJson and checked
   // by ParseManifest.
-  std::string kind = "material";
+  std::string kind = "material";  // or "brdf"
   std::string asset;
   ManifestTool tool;
   std::string fingerprint;  // hex SHA-256 of recipe, job and input hashes
   uint64_t seed = 1;        // below 2^63, which is as far as JSON Schema validators count
-  std::string profile;      // "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"
+  std::string profile;      // [material] "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"
   std::string quality_setting = "standard";  // "preview", "standard", "reference"
-  ManifestSource source;
+  ManifestSource source;                     // [material]
   std::vector<ManifestPayload> payloads;
-  std::vector<ManifestFeature> features;   // empty when every channel is constant
-  std::optional<ManifestNetwork> network;  // likewise
-  std::vector<ManifestChannel> channels;
-  std::vector<ManifestMap> maps;
+  std::vector<ManifestFeature> features;     // [material] empty when every channel is constant
+  std::optional<ManifestNetwork> network;    // [material] likewise
+  std::vector<ManifestChannel> channels;     // [material]
+  std::vector<ManifestMap> maps;             // [material]
+  std::optional<ManifestBrdf> brdf;          // of kind "brdf", and only there
   std::string working_space = "lin_rec709";  // of physical colour values
-  ManifestQuality quality;
-  ManifestTraining training;
+  ManifestQuality quality;                   // [material]
+  ManifestTraining training;                 // [material]
   std::vector<ManifestLeftOut> left_out;
   std::vector<std::string> warnings;
 };

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "formats/base/names.h"
 #include "formats/dds.h"
+#include "formats/index_pack.h"
 
 namespace patina {
 namespace {
@@ -273,10 +275,99 @@ Status CheckTraining(const ManifestTraining& training) {
   return {};
 }
 
+Status NotNegative(const Pointer& pointer, const std::optional<double>& value) {
+  if (value && !(std::isfinite(*value) && *value >= 0))
+    return Bad(pointer, "not a finite number of at least 0");
+  return {};
+}
+
+Status CheckBrdfQuality(const ManifestBrdfQuality& quality) {
+  PATINA_TRY(NotNegative("/quality/image_mae", quality.image_mae));
+  PATINA_TRY(NotNegative("/quality/image_rmse", quality.image_rmse));
+  if (quality.image_ssim) PATINA_TRY(InRange("/quality/image_ssim", *quality.image_ssim, -1, 1));
+  PATINA_TRY(NotNegative("/quality/log1p_mse", quality.log1p_mse));
+  PATINA_TRY(NotNegative("/quality/reciprocity_error", quality.reciprocity_error));
+  for (size_t i = 0; i < quality.albedo.size(); ++i) {
+    const Pointer at = "/quality/albedo/" + std::to_string(i);
+    PATINA_TRY(InRange(at + "/theta_deg", quality.albedo[i].theta_deg, 0, 90));
+    for (size_t c = 0; c < 3; ++c)
+      PATINA_TRY(NotNegative(at + "/rgb/" + std::to_string(c), quality.albedo[i].rgb[c]));
+  }
+  return {};
+}
+
+Status CheckBrdfCodebook(const Manifest& manifest, const ManifestBrdf& brdf) {
+  const bool shared = !brdf.shared_codebook_file.empty() || !brdf.shared_codebook_sha256.empty();
+  if (!brdf.codebook.empty()) {
+    if (shared) return Bad("/brdf/codebook", "both a payload and a shared file");
+    return CheckReference("/brdf/codebook/payload", manifest, brdf.codebook, "codebook");
+  }
+  if (!shared) return {};
+  if (auto status = CheckPlainName(brdf.shared_codebook_file, "/brdf/codebook/file:"); !status)
+    return status;
+  return HexDigest("/brdf/codebook/sha256", brdf.shared_codebook_sha256);
+}
+
+Status CheckBrdf(const Manifest& manifest) {
+  if (!manifest.brdf) return Bad("/brdf", "missing in a manifest of kind \"brdf\"");
+  if (!manifest.features.empty() || manifest.network || !manifest.channels.empty() ||
+      !manifest.maps.empty()) {
+    return Bad("/kind", "\"brdf\" with feature textures, a network, channels or maps");
+  }
+  const ManifestBrdf& brdf = *manifest.brdf;
+  PATINA_TRY(NotEmpty("/source/format", brdf.source_format));
+  if (brdf.invalid_cells > brdf.cells)
+    return Bad("/source/invalid_cells",
+               std::to_string(brdf.invalid_cells) + " of " + std::to_string(brdf.cells) + " cells");
+  for (size_t i = 0; i < brdf.files.size(); ++i) {
+    const Pointer at = "/source/files/" + std::to_string(i);
+    if (auto status = CheckRelativePath(brdf.files[i].path, at + "/path:"); !status) return status;
+    PATINA_TRY(HexDigest(at + "/sha256", brdf.files[i].sha256));
+  }
+  PATINA_TRY(CheckReference("/brdf/grid", manifest, brdf.grid, "grid"));
+  PATINA_TRY(CheckBrdfCodebook(manifest, brdf));
+  PATINA_TRY(InRange("/brdf/nside", brdf.nside, 1, healpix::kMaxNside));
+  PATINA_TRY(InRange("/brdf/primitive_size", brdf.primitive_size, 1, kMaxPrimitiveSize));
+  PATINA_TRY(InRange("/brdf/index_bits", brdf.index_bits, 1, kMaxIndexBits));
+  PATINA_TRY(OneOf("/brdf/interpolation", brdf.interpolation,
+                   {"bilinear", "inverse_distance", "uniform"}, ErrorCode::kUnsupported));
+  PATINA_TRY(CheckReference("/brdf/network/payload", manifest, brdf.network, "weights"));
+  const size_t count = brdf.layers.size();
+  if (count < 2 || count > static_cast<size_t>(kMaxManifestLayers) + 1)
+    return Bad("/brdf/network/layers", std::to_string(count) + " widths, not 2 to 17");
+  for (size_t i = 0; i < count; ++i) {
+    PATINA_TRY(InRange("/brdf/network/layers/" + std::to_string(i), brdf.layers[i], 1,
+                       kMaxManifestLayerWidth));
+  }
+  const int inputs = 2 * brdf.primitive_size + (brdf.angle_inputs ? 3 : 0);
+  if (brdf.layers.front() != inputs || brdf.layers.back() != 3) {
+    return Bad("/brdf/network/layers", std::to_string(brdf.layers.front()) + " inputs and " +
+                                           std::to_string(brdf.layers.back()) + " outputs, not " +
+                                           std::to_string(inputs) + " and 3");
+  }
+  PATINA_TRY(OneOf("/brdf/network/activation", brdf.activation, {"relu"}, ErrorCode::kUnsupported));
+  PATINA_TRY(
+      OneOf("/brdf/output_transform", brdf.output_transform, {"expm1"}, ErrorCode::kUnsupported));
+  if (!brdf.sampler.empty())
+    PATINA_TRY(CheckReference("/brdf/sampler", manifest, brdf.sampler, "sampler"));
+  return CheckBrdfQuality(brdf.quality);
+}
+
+Status CheckMaterial(const Manifest& manifest) {
+  if (manifest.brdf) return Bad("/brdf", "in a manifest of kind \"material\"");
+  PATINA_TRY(NotEmpty("/profile", manifest.profile));
+  PATINA_TRY(CheckSource(manifest.source));
+  PATINA_TRY(CheckModel(manifest));
+  PATINA_TRY(CheckChannels(manifest));
+  PATINA_TRY(CheckMaps(manifest));
+  PATINA_TRY(CheckQuality(manifest));
+  return CheckTraining(manifest.training);
+}
+
 }  // namespace
 
 Status CheckManifest(const Manifest& manifest) {
-  PATINA_TRY(OneOf("/kind", manifest.kind, {"material"}, ErrorCode::kUnsupported));
+  PATINA_TRY(OneOf("/kind", manifest.kind, {"material", "brdf"}, ErrorCode::kUnsupported));
   if (auto status = CheckPlainName(manifest.asset, "/asset: asset name"); !status) return status;
   PATINA_TRY(NotEmpty("/tool/name", manifest.tool.name));
   PATINA_TRY(NotEmpty("/tool/version", manifest.tool.version));
@@ -285,17 +376,11 @@ Status CheckManifest(const Manifest& manifest) {
   PATINA_TRY(HexDigest("/fingerprint", manifest.fingerprint));
   if (manifest.seed > static_cast<uint64_t>(INT64_MAX))
     return Bad("/seed", std::to_string(manifest.seed) + " is 2^63 or more");
-  PATINA_TRY(NotEmpty("/profile", manifest.profile));
   PATINA_TRY(NotEmpty("/quality_setting", manifest.quality_setting));
-  PATINA_TRY(CheckSource(manifest.source));
   PATINA_TRY(CheckPayloads(manifest));
-  PATINA_TRY(CheckModel(manifest));
-  PATINA_TRY(CheckChannels(manifest));
-  PATINA_TRY(CheckMaps(manifest));
   PATINA_TRY(OneOf("/color/working_space", manifest.working_space, {"lin_rec709"},
                    ErrorCode::kUnsupported));
-  PATINA_TRY(CheckQuality(manifest));
-  return CheckTraining(manifest.training);
+  return manifest.kind == "brdf" ? CheckBrdf(manifest) : CheckMaterial(manifest);
 }
 
 }  // namespace patina

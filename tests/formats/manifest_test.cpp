@@ -9,12 +9,14 @@
 
 #include "formats/base/file_io.h"
 #include "formats/schema_check.h"
+#include "tests/formats/sample_brdf.h"
 #include "tests/formats/sample_container.h"
 
 namespace patina {
 namespace {
 
 using nlohmann::json;
+using test::FullBrdfManifest;
 using test::FullManifest;
 
 std::string ExamplePath(const std::string& name) {
@@ -120,8 +122,7 @@ TEST(Manifest, SurvivesHostileDocuments) {
 }
 
 // Every member of the document, one after another, removed and replaced by values of other types.
-TEST(Manifest, ReportsEveryMissingOrMistypedFieldOrAcceptsIt) {
-  const json good = FullDocument();
+void ReportsEveryMistypedFieldOrAcceptsIt(const json& good, size_t least_fields) {
   std::vector<json::json_pointer> pointers;
   const std::function<void(const json&, const json::json_pointer&)> collect =
       [&](const json& value, const json::json_pointer& at) {
@@ -138,7 +139,7 @@ TEST(Manifest, ReportsEveryMissingOrMistypedFieldOrAcceptsIt) {
         }
       };
   collect(good, json::json_pointer());
-  ASSERT_GT(pointers.size(), 200u);
+  ASSERT_GT(pointers.size(), least_fields);
   int refused = 0;
   for (const auto& pointer : pointers) {
     for (const json& value :
@@ -161,6 +162,14 @@ TEST(Manifest, ReportsEveryMissingOrMistypedFieldOrAcceptsIt) {
   EXPECT_GT(refused, static_cast<int>(pointers.size()) * 6);
 }
 
+TEST(Manifest, ReportsEveryMissingOrMistypedFieldOrAcceptsIt) {
+  ReportsEveryMistypedFieldOrAcceptsIt(FullDocument(), 200);
+}
+
+TEST(Manifest, ReportsEveryMissingOrMistypedFieldOfABrdfOrAcceptsIt) {
+  ReportsEveryMistypedFieldOrAcceptsIt(json::parse(*ToJson(FullBrdfManifest())), 80);
+}
+
 struct BrokenRule {
   const char* pointer;  // that the message must begin with
   std::function<void(Manifest*)> break_it;
@@ -169,7 +178,7 @@ struct BrokenRule {
 TEST(Manifest, WriterAndReaderRefuseBrokenRules) {
   const BrokenRule rules[] = {
       {"/asset", [](Manifest* m) { m->asset = "../up"; }},
-      {"/kind", [](Manifest* m) { m->kind = "brdf"; }},
+      {"/kind", [](Manifest* m) { m->kind = "cloth"; }},
       {"/fingerprint", [](Manifest* m) { m->fingerprint = std::string(64, 'A'); }},
       {"/seed", [](Manifest* m) { m->seed = 9223372036854775808ull; }},
       {"/source/levels", [](Manifest* m) { m->source.levels = 6; }},
@@ -225,7 +234,7 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRules) {
 
 TEST(Manifest, ReaderSaysUnsupportedForWhatItCannotDecode) {
   for (const auto& [pointer, value] : std::initializer_list<std::pair<const char*, const char*>>{
-           {"/kind", "brdf"},
+           {"/kind", "cloth"},
            {"/format", "other"},
            {"/channels/0/encoding", "pq"},
            {"/network/activation", "gelu"},
@@ -239,6 +248,92 @@ TEST(Manifest, ReaderSaysUnsupportedForWhatItCannotDecode) {
     EXPECT_EQ(manifest.error().code, ErrorCode::kUnsupported) << manifest.error().message;
     EXPECT_EQ(manifest.error().message.rfind(pointer, 0), 0u) << manifest.error().message;
   }
+}
+
+TEST(Manifest, BrdfsReadAndWriteTheSameBytes) {
+  const auto text = ToJson(FullBrdfManifest());
+  ASSERT_OK(text);
+  const auto golden = ReadTextFile(ExamplePath("manifest_brdf.json"), kMaxManifestBytes);
+  ASSERT_OK(golden);
+  EXPECT_EQ(*text, *golden);
+  const auto manifest = ParseManifest(*text);
+  ASSERT_OK(manifest);
+  EXPECT_EQ(ToJson(*manifest).value(), *text);
+  EXPECT_EQ(manifest->brdf->layers, (std::vector<int>{35, 32, 32, 3}));
+  EXPECT_EQ(manifest->brdf->shared_codebook_file, "metals.hpc");
+  EXPECT_EQ(manifest->brdf->quality.albedo[4].theta_deg, 89);
+  EXPECT_EQ(*manifest->brdf->quality.image_ssim, 0.9990234375);
+  for (const char* absent : {"profile", "features", "network", "channels", "maps", "training"})
+    EXPECT_FALSE(json::parse(*text).contains(absent)) << absent;
+
+  Manifest small = FullBrdfManifest();
+  small.brdf->shared_codebook_file.clear();
+  small.brdf->shared_codebook_sha256.clear();
+  small.brdf->sampler.clear();
+  small.brdf->files.clear();
+  small.brdf->quality = {};
+  const auto small_text = ToJson(small);
+  ASSERT_OK(small_text);
+  EXPECT_FALSE(json::parse(*small_text)["brdf"].contains("codebook"));
+  EXPECT_FALSE(json::parse(*small_text)["brdf"].contains("sampler"));
+  EXPECT_EQ(ToJson(*ParseManifest(*small_text)).value(), *small_text);
+  ASSERT_OK(CheckAgainstSchema("manifest", json::parse(*small_text)));
+}
+
+TEST(Manifest, WriterAndReaderRefuseBrokenRulesOfBrdfs) {
+  const BrokenRule rules[] = {
+      {"/kind", [](Manifest* m) { m->kind = "cloth"; }},
+      {"/brdf", [](Manifest* m) { m->brdf.reset(); }},
+      {"/brdf", [](Manifest* m) { m->kind = "material"; }},
+      {"/kind", [](Manifest* m) { m->maps.resize(1); }},
+      {"/source/format", [](Manifest* m) { m->brdf->source_format = ""; }},
+      {"/source/invalid_cells", [](Manifest* m) { m->brdf->invalid_cells = 1458001; }},
+      {"/source/files/0/path", [](Manifest* m) { m->brdf->files[0].path = "../x"; }},
+      {"/source/files/0/sha256", [](Manifest* m) { m->brdf->files[0].sha256 = "5"; }},
+      {"/brdf/grid", [](Manifest* m) { m->brdf->grid = "decoder.weights"; }},
+      {"/brdf/codebook/payload",
+       [](Manifest* m) {
+         m->brdf->codebook = "grid.hpx";
+         m->brdf->shared_codebook_file = m->brdf->shared_codebook_sha256 = "";
+       }},
+      {"/brdf/codebook", [](Manifest* m) { m->brdf->codebook = "grid.hpx"; }},
+      {"/brdf/codebook/file", [](Manifest* m) { m->brdf->shared_codebook_file = "../m.hpc"; }},
+      {"/brdf/codebook/sha256", [](Manifest* m) { m->brdf->shared_codebook_sha256 = "x"; }},
+      {"/brdf/nside", [](Manifest* m) { m->brdf->nside = 1025; }},
+      {"/brdf/primitive_size", [](Manifest* m) { m->brdf->primitive_size = 0; }},
+      {"/brdf/index_bits", [](Manifest* m) { m->brdf->index_bits = 17; }},
+      {"/brdf/interpolation", [](Manifest* m) { m->brdf->interpolation = "cubic"; }},
+      {"/brdf/network/payload", [](Manifest* m) { m->brdf->network = "grid.hpx"; }},
+      {"/brdf/network/layers", [](Manifest* m) { m->brdf->layers = {35}; }},
+      {"/brdf/network/layers", [](Manifest* m) { m->brdf->layers.assign(18, 3); }},
+      {"/brdf/network/layers", [](Manifest* m) { m->brdf->angle_inputs = false; }},
+      {"/brdf/network/layers", [](Manifest* m) { m->brdf->layers.back() = 4; }},
+      {"/brdf/network/layers/1", [](Manifest* m) { m->brdf->layers[1] = 513; }},
+      {"/brdf/network/activation", [](Manifest* m) { m->brdf->activation = "gelu"; }},
+      {"/brdf/output_transform", [](Manifest* m) { m->brdf->output_transform = "exp"; }},
+      {"/brdf/sampler", [](Manifest* m) { m->brdf->sampler = "preview.png"; }},
+      {"/quality/image_mae", [](Manifest* m) { m->brdf->quality.image_mae = NAN; }},
+      {"/quality/image_rmse", [](Manifest* m) { m->brdf->quality.image_rmse = -1; }},
+      {"/quality/image_ssim", [](Manifest* m) { m->brdf->quality.image_ssim = 1.5; }},
+      {"/quality/log1p_mse", [](Manifest* m) { m->brdf->quality.log1p_mse = INFINITY; }},
+      {"/quality/reciprocity_error",
+       [](Manifest* m) { m->brdf->quality.reciprocity_error = -0.5; }},
+      {"/quality/albedo/1/theta_deg",
+       [](Manifest* m) { m->brdf->quality.albedo[1].theta_deg = 91; }},
+      {"/quality/albedo/2/rgb/1", [](Manifest* m) { m->brdf->quality.albedo[2].rgb[1] = NAN; }},
+  };
+  for (const BrokenRule& rule : rules) {
+    Manifest manifest = FullBrdfManifest();
+    rule.break_it(&manifest);
+    const auto text = ToJson(manifest);
+    ASSERT_FALSE(text) << rule.pointer;
+    EXPECT_EQ(text.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_EQ(text.error().message.rfind(rule.pointer, 0), 0u)
+        << rule.pointer << " / " << text.error().message;
+  }
+  json document = json::parse(*ToJson(FullBrdfManifest()));
+  document["brdf"]["interpolation"] = "cubic";
+  EXPECT_EQ(ParseManifest(document.dump()).error().code, ErrorCode::kUnsupported);
 }
 
 // schemas/examples/manifest_invalid_*.json break the schema; the other manifest_*.json satisfy
