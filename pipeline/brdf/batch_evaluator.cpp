@@ -1,0 +1,104 @@
+#include "pipeline/brdf/batch_evaluator.h"
+
+#include <algorithm>
+
+#include "formats/half.h"
+
+namespace patina::brdf {
+namespace {
+
+const WeightTensor* FindTensor(const WeightBuffer& buffer, const std::string& name) {
+  for (const WeightTensor& tensor : buffer.tensors) {
+    if (tensor.name == name) return &tensor;
+  }
+  return nullptr;
+}
+
+Error BadNetwork(const std::string& what) {
+  return {ErrorCode::kCorruptData, "the network does not fit the index pack: " + what};
+}
+
+}  // namespace
+
+Result<BatchEvaluator> BatchEvaluator::Create(const IndexPack& pack,
+                                              const std::vector<float>& features,
+                                              const WeightBuffer& network) {
+  PATINA_ASSIGN(const SimdTarget target, ActiveSimdTarget());
+  BatchEvaluator evaluator;
+  evaluator.kernels_ = &KernelsFor(target);
+  evaluator.grid_ = {pack.nside, pack.interpolation, pack.isotropic, pack.canonical_order,
+                     pack.angle_inputs};
+  const int layers = static_cast<int>(network.tensors.size() / 2);
+  const WeightTensor* first = FindTensor(network, "layer0.weight");
+  if (layers < 2 || first == nullptr || first->shape.size() != 2)
+    return Fail(BadNetwork("two layers or more are needed"));
+  const int hidden = static_cast<int>(first->shape[0]);
+  if (hidden > 256) return Fail(BadNetwork("more than 256 hidden units"));
+  evaluator.layout_ = std::make_unique<NetworkLayout>(
+      pack.primitive_size, evaluator.grid_.extra_inputs(), hidden, layers - 1);
+  const NetworkLayout& layout = *evaluator.layout_;
+  evaluator.parameters_.Reset(layout.parameter_count);
+  for (int l = 0; l < layers; ++l) {
+    const DenseLayer& layer = layout.layers[l];
+    const std::string name = "layer" + std::to_string(l);
+    const WeightTensor *weight = FindTensor(network, name + ".weight"),
+                       *bias = FindTensor(network, name + ".bias");
+    const uint32_t outputs = l + 1 < layers ? hidden : kOutputs;
+    const uint32_t inputs = l == 0 ? 2 * pack.primitive_size + layout.extra_inputs : hidden;
+    if (weight == nullptr || weight->shape != std::vector<uint32_t>{outputs, inputs})
+      return Fail(BadNetwork(name + ".weight has another shape"));
+    if (bias == nullptr || bias->shape != std::vector<uint32_t>{outputs})
+      return Fail(BadNetwork(name + ".bias has another shape"));
+    for (uint32_t o = 0; o < outputs; ++o) {
+      for (uint32_t i = 0; i < inputs; ++i) {
+        uint32_t column = i;  // features are padded to whole vectors
+        if (l == 0) {
+          const uint32_t k = pack.primitive_size, stride = layout.feature_stride;
+          column = i < k ? i : i < 2 * k ? stride + i - k : 2 * stride + i - 2 * k;
+        }
+        evaluator.parameters_[layer.weights + static_cast<size_t>(column) * layer.outputs + o] =
+            HalfToFloat(weight->elements[static_cast<size_t>(o) * inputs + i]);
+      }
+      evaluator.parameters_[layer.weights + static_cast<size_t>(layer.inputs) * layer.outputs + o] =
+          HalfToFloat(bias->elements[o]);
+    }
+  }
+  const size_t corners = 2 * static_cast<size_t>(evaluator.grid_.corners());
+  if (features.size() != corners * pack.primitive_size)
+    return Fail(BadNetwork("another number of corners"));
+  evaluator.features_.Reset(corners * layout.feature_stride);
+  for (size_t c = 0; c < corners; ++c) {
+    std::copy_n(features.data() + c * pack.primitive_size, pack.primitive_size,
+                evaluator.features_.data() + c * layout.feature_stride);
+  }
+  return evaluator;
+}
+
+BatchEvaluator::Scratch::Scratch(const BatchEvaluator& evaluator)
+    : chunk_(evaluator.layout()), samples_(kChunkRows) {}
+
+void BatchEvaluator::Evaluate(Scratch* scratch, size_t count, const Direction* wi,
+                              const Direction* wo, float* rgb) const {
+  ChunkTask task;
+  task.layout = layout_.get();
+  task.parameters = parameters_.data();
+  task.features = features_.data();
+  task.samples = scratch->samples_.data();
+  for (size_t first = 0; first < count; first += kChunkRows) {
+    task.count = static_cast<int>(std::min<size_t>(kChunkRows, count - first));
+    PoolSample* samples = scratch->samples_.data();
+    if (grid_.interpolation == healpix::Interpolation::kBilinear) {
+      const LookUpGrid grid = {grid_.nside, grid_.corners(), grid_.isotropic, grid_.canonical_order,
+                               grid_.angle_inputs};
+      kernels_->look_up_pairs(grid, wi + first, wo + first, task.count, samples);
+    } else {
+      for (int s = 0; s < task.count; ++s)
+        LookUpPair(grid_, wi[first + s], wo[first + s], &samples[s]);
+    }
+    kernels_->forward_chunk(task, &scratch->chunk_);
+    kernels_->output_values(scratch->chunk_.outputs.data(), wi + first, wo + first, task.count,
+                            rgb + first * kOutputs);
+  }
+}
+
+}  // namespace patina::brdf

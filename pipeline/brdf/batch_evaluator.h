@@ -1,0 +1,50 @@
+// Evaluates a baked BRDF in batches with the SIMD kernels: what a CPU renderer would do, and what
+// verification uses.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/index_pack.h"
+#include "formats/weights.h"
+#include "pipeline/brdf/brdf_kernels.h"
+#include "pipeline/brdf/sample_pool.h"
+
+namespace patina::brdf {
+
+class BatchEvaluator {
+ public:
+  // Scratch of one thread.
+  class Scratch {
+   public:
+    explicit Scratch(const BatchEvaluator& evaluator);
+
+   private:
+    friend class BatchEvaluator;
+    ChunkScratch chunk_;
+    AlignedBuffer<PoolSample> samples_;
+  };
+
+  // features: as ExpandCorners gives them. Errors: kCorruptData (tensors that do not fit the pack
+  // or each other), kUnsupported (CPU).
+  static Result<BatchEvaluator> Create(const IndexPack& pack, const std::vector<float>& features,
+                                       const WeightBuffer& network);
+
+  // f of `count` pairs of unit vectors, rgb [count][3]; zero where a direction is not above the
+  // horizon. Any count.
+  void Evaluate(Scratch* scratch, size_t count, const Direction* wi, const Direction* wo,
+                float* rgb) const;
+
+  const NetworkLayout& layout() const { return *layout_; }
+
+ private:
+  BatchEvaluator() = default;
+
+  const BrdfKernels* kernels_ = nullptr;
+  GridShape grid_;
+  std::unique_ptr<NetworkLayout> layout_;
+  AlignedBuffer<float> features_, parameters_;
+};
+
+}  // namespace patina::brdf

@@ -1,0 +1,133 @@
+// The kernels of the BRDF trainer: lookups in the index grid, the network on rows of samples, the
+// gradient of the corners.
+//
+// A batch is cut into chunks of kChunkRows samples. In a chunk, rows are samples and columns are
+// features, so that every product of the network, forward and backward, is one small matrix product
+// with the columns in lanes and needs no transposition:
+//   forward       C[s][n]  = sum_k A[s][k] W[k][n]      bias: a column of ones in A, a last row of
+//   W to inputs     dA[s][k] = sum_n dC[s][n] W[k][n] to weights    dW[k][n] = sum_s A[s][k]
+//   dC[s][n]
+// Sums run in the order of k, n and s on every target, so AVX2 and AVX-512 give the same bits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "formats/brdf/brdf_source.h"
+#include "pipeline/base/aligned_buffer.h"
+#include "pipeline/kernels/dispatch.h"
+
+namespace patina::brdf {
+
+inline constexpr int kChunkRows = 128;
+inline constexpr int kOutputs = 3;  // y of red, green, blue; f = exp(y) - 1
+inline constexpr float kMaxLogValue = 12.0f;
+
+constexpr int PadTo16(int n) { return (n + 15) / 16 * 16; }
+
+// One dense layer in the flat parameter arrays.
+struct DenseLayer {
+  int inputs = 0;        // columns of A that are used, without the ones
+  int outputs = 0;       // columns of C, a multiple of 16
+  int input_stride = 0;  // floats between rows of A: PadTo16(inputs + 1)
+  size_t weights = 0;    // offset of W [inputs + 1][outputs]
+  size_t transposed =
+      0;  // offset of its transpose [outputs][PadTo16(inputs)], in an array of its own
+};
+
+// Where everything lies. Input columns: features of wi [stride], of wo [stride], then the extra
+// inputs.
+struct NetworkLayout {
+  NetworkLayout(int primitive_size, int extra_inputs, int hidden, int hidden_layers);
+
+  int primitive_size;  // k
+  int feature_stride;  // k rounded up to 16: floats between rows of features
+  int extra_inputs;    // 0 or 3
+  int hidden;
+  std::vector<DenseLayer> layers;
+  size_t parameter_count = 0;
+  size_t transposed_count = 0;
+
+  int input_columns() const { return 2 * feature_stride + extra_inputs; }
+  // Multiply-adds of one sample that do work: padding is not counted.
+  double ForwardMacs() const;
+};
+
+// One training sample, looked up once: corners are rows of the grid of both hemispheres.
+struct alignas(32) PoolSample {
+  int32_t corner[8];  // four of wi, four of wo
+  float weight[8];    // of the corners
+  float extra[3];     // the scalar inputs l, t, q
+  float value[3];     // f, 1/sr
+  float cosine;       // of the direction that is nearer to the normal
+  float importance;   // factor of the loss
+};
+
+// What a lookup needs to know of the grid; bilinear weights.
+struct LookUpGrid {
+  int nside = 1;
+  int corners = 0;  // of one hemisphere: where those of wo begin
+  bool isotropic = true, canonical_order = true, angle_inputs = true;
+};
+
+struct ChunkScratch {
+  explicit ChunkScratch(const NetworkLayout& layout);
+  std::vector<AlignedBuffer<float>> activations;  // [layer] [kChunkRows][input_stride]
+  AlignedBuffer<float> outputs;                   // [kChunkRows][16]
+  AlignedBuffer<float> gradient[2];               // [kChunkRows][widest layer], in turn
+};
+
+// What a chunk leaves behind for the step that follows.
+struct ChunkResult {
+  explicit ChunkResult(const NetworkLayout& layout);
+  AlignedBuffer<float> weight_gradient;   // like the parameters
+  AlignedBuffer<float> feature_gradient;  // [kChunkRows][2 * feature_stride]
+  double loss = 0;
+};
+
+struct ChunkTask {
+  const NetworkLayout* layout = nullptr;
+  const float* parameters = nullptr;
+  const float* transposed = nullptr;
+  const float* features = nullptr;         // rows of feature_stride floats
+  const int32_t* row_of_corner = nullptr;  // codebook: row of a corner; null: its own
+  const PoolSample* samples = nullptr;
+  int count = kChunkRows;  // 1..kChunkRows; the rest is computed for nothing
+};
+
+struct AdamSettings {
+  float rate = 0;
+  float beta1 = 0.9f, beta2 = 0.99f, epsilon = 1e-8f;
+  float correction1 = 1, correction2 = 1;  // 1 / (1 - beta^t)
+};
+
+struct BrdfKernels {
+  // Forward, loss and backward. Loss of a sample (sum over channels):
+  //   |log1p(f c) - log1p(f* c)| + 0.05 |log1p(f) - log1p(f*)|,  f = exp(y) - 1
+  void (*train_chunk)(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* result);
+  // Forward only: y [kChunkRows][16] into scratch->outputs.
+  void (*forward_chunk)(const ChunkTask& task, ChunkScratch* scratch);
+  // Fills corners, weights and scalars of `count` pairs, as LookUpPair (sample_pool.h) does within
+  // a few roundings. Directions are finite.
+  void (*look_up_pairs)(const LookUpGrid& grid, const Direction* wi, const Direction* wo, int count,
+                        PoolSample* samples);
+  // rgb [count][3] = max(0, exp(min(y, 12)) - 1) of the outputs of forward_chunk; 0 where a
+  // direction is not above the horizon.
+  void (*output_values)(const float* outputs, const Direction* wi, const Direction* wo, int count,
+                        float* rgb);
+  // gradient[corner] += weight * feature gradient, for one hemisphere (0: wi, 1: wo), in sample
+  // order.
+  void (*scatter)(const NetworkLayout& layout, const PoolSample* samples, int count, int hemisphere,
+                  const ChunkResult& result, float* gradient);
+  // One Adam step of `count` floats, a multiple of 16; clears the gradient.
+  void (*adam)(float* parameters, float* gradient, float* moment1, float* moment2, size_t count,
+               const AdamSettings& settings);
+};
+
+const BrdfKernels& KernelsFor(SimdTarget target);
+
+// Fills `transposed` from the parameters.
+void TransposeWeights(const NetworkLayout& layout, const float* parameters, float* transposed);
+
+}  // namespace patina::brdf

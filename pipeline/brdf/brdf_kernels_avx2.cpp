@@ -1,0 +1,16 @@
+// BRDF kernels for avx2; see pipeline/kernels/simd16.h for the scheme.
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "pipeline/brdf/brdf_kernels.h"
+
+// clang-format off: the order is the scheme
+#include "pipeline/kernels/begin_avx2.h"
+#include "pipeline/kernels/simd16.h"
+#include "pipeline/kernels/unroll.h"
+#include "pipeline/kernels/math16.inl"
+#include "pipeline/brdf/row_product.inl"
+#include "pipeline/brdf/pair_lookup.inl"
+#include "pipeline/brdf/brdf_kernels.inl"
+#include "pipeline/kernels/end_target.h"

@@ -1,0 +1,77 @@
+// The optimiser of a grid of features (or of indices into a codebook) and the network behind it.
+//
+// Based on: Dou 2023 ("NeuBRDF"), sections 3.3 and 4, with the per-corner accumulation of
+// design/neural-brdf: the gradient by the feature of a corner is summed first, so that what follows
+// (Adam, codebook, softmax) costs one row a corner and step.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "pipeline/base/rng.h"
+#include "pipeline/base/thread_pool.h"
+#include "pipeline/brdf/brdf_kernels.h"
+
+namespace patina::brdf {
+
+struct StepRates {
+  float features = 0;  // or, once there is a codebook, of its codes
+  float network = 0;
+};
+
+// Corners are numbered through all grids; rows of features have layout.feature_stride floats.
+// Results do not depend on the number of threads. Not thread-safe.
+class GridTrainer {
+ public:
+  // grids: number of rows of each grid; wi's of material 0, wo's of material 0, wi's of material 1,
+  // ... A sample's four corners of wi lie in an even grid, those of wo in the odd one after it.
+  GridTrainer(const NetworkLayout& layout, int corners, const BrdfKernels& kernels,
+              ThreadPool& pool, uint64_t seed);
+
+  // One step on `count` samples, at most the batch given to Reserve. Returns false, changing
+  // nothing, if a value was not finite.
+  bool Step(const PoolSample* samples, int count, const StepRates& rates);
+
+  // Goes over to a codebook: `codes` rows and an index for each corner. From here on steps move the
+  // codes; the index stays.
+  void UseCodebook(std::vector<float> codebook, std::vector<int32_t> index);
+  bool has_codebook() const { return !index_.empty(); }
+
+  // Mean loss since the last call.
+  double TakeLoss();
+
+  // y of samples in order: [count][3].
+  void Evaluate(const PoolSample* samples, size_t count, float* y);
+
+  const NetworkLayout& layout() const { return layout_; }
+  int corners() const { return corners_; }
+  AlignedBuffer<float>& features() { return features_; }
+  AlignedBuffer<float>& codebook() { return codebook_; }
+  const std::vector<int32_t>& index() const { return index_; }
+  AlignedBuffer<float>& parameters() { return parameters_; }
+  void ParametersChanged() { TransposeWeights(layout_, parameters_.data(), transposed_.data()); }
+
+ private:
+  ChunkTask MakeTask(const PoolSample* samples, int count) const;
+  void UpdateRows(const std::vector<int32_t>& rows, const AdamSettings& settings, float* values,
+                  float* gradient, float* moment1, float* moment2);
+
+  const NetworkLayout& layout_;
+  int corners_;
+  const BrdfKernels& kernels_;
+  ThreadPool& pool_;
+  AlignedBuffer<float> parameters_, transposed_, parameter_gradient_, parameter_moment1_,
+      parameter_moment2_;
+  AlignedBuffer<float> features_, gradient_, moment1_, moment2_;
+  AlignedBuffer<float> codebook_, code_gradient_, code_moment1_, code_moment2_;
+  std::vector<int32_t> index_;
+  std::vector<std::unique_ptr<ChunkScratch>> scratch_;
+  std::vector<std::unique_ptr<ChunkResult>> results_;
+  std::vector<uint8_t> touched_, code_touched_;
+  std::vector<int32_t> rows_[2], code_rows_;
+  int steps_ = 0, code_steps_ = 0;
+  double loss_ = 0, loss_samples_ = 0;
+};
+
+}  // namespace patina::brdf
