@@ -3,8 +3,10 @@
 #include <set>
 
 #include "formats/base/file_io.h"
+#include "formats/brdf/brdf_source.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/result_text.h"
+#include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/event_log.h"
 #include "pipeline/jobs/job_runner.h"
 #include "pipeline/jobs/job_sets.h"
@@ -30,22 +32,63 @@ void Override(const std::optional<T>& given, T* value) {
   if (given) *value = *given;
 }
 
+// Options that were given and that BRDFs do not have, for a message.
+std::string MapOptions(const JobOverrides& given) {
+  std::string names;
+  const auto add = [&names](bool is_given, const char* name) {
+    if (is_given) names += (names.empty() ? "" : ", ") + std::string(name);
+  };
+  add(given.profile.has_value(), "--profile");
+  add(given.address.has_value(), "--address");
+  add(given.normal_convention.has_value(), "--normal-convention");
+  add(given.target_psnr_db.has_value(), "--target-psnr");
+  add(given.time_budget_s.has_value(), "--time-budget");
+  add(given.samples.has_value(), "--samples");
+  add(given.min_psnr_db.has_value(), "--min-psnr");
+  add(given.repair_nonfinite, "--repair-nonfinite");
+  add(given.no_toksvig, "--no-toksvig");
+  return names;
+}
+
 void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.out, &job->out);
-  Override(overrides.profile, ParseProfile, &job->profile);
   Override(overrides.quality, ParseQuality, &job->quality);
   Override(overrides.recipe, ParseRecipe, &job->recipe);
+  Override(overrides.seed, &job->seed);
+  Override(overrides.threads, &job->threads);
+  if (job->kind == JobKind::kBrdf) {
+    const std::string names = MapOptions(overrides);
+    if (!names.empty()) {
+      std::fprintf(stderr, "patina: warning: %s: a BRDF has no %s; passed over\n",
+                   job->asset.c_str(), names.c_str());
+    }
+    return;
+  }
+  Override(overrides.profile, ParseProfile, &job->profile);
   if (overrides.address)
     job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
   Override(overrides.normal_convention, &job->normal_convention);
-  Override(overrides.seed, &job->seed);
-  Override(overrides.threads, &job->threads);
   Override(overrides.target_psnr_db, &job->target_psnr_db);
   Override(overrides.time_budget_s, &job->time_budget_s);
   Override(overrides.samples, &job->samples);
   Override(overrides.min_psnr_db, &job->min_psnr_db);
   if (overrides.repair_nonfinite) job->repair_nonfinite = true;
   if (overrides.no_toksvig) job->toksvig = false;
+}
+
+Job BrdfJob(const std::string& asset, const std::string& file) {
+  Job job;
+  job.kind = JobKind::kBrdf;
+  job.asset = asset;
+  job.file = file;
+  return job;
+}
+
+// A file is a BRDF by its extension; a .json by its content, as job files end so, too.
+bool IsBrdfInput(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension == ".json" ? IsMeasurementList(path) : brdf::HasBrdfExtension(path);
 }
 
 void PlanFolder(const std::string& folder, const BakeOptions& options, Verbosity verbosity,
@@ -57,12 +100,17 @@ void PlanFolder(const std::string& folder, const BakeOptions& options, Verbosity
   }
   if (verbosity == Verbosity::kVerbose) {
     for (const std::string& skipped : found->skipped) {
-      std::fprintf(stderr, "patina: %s holds no images and is passed over\n", skipped.c_str());
+      std::fprintf(stderr, "patina: %s holds no images and no BRDFs and is passed over\n",
+                   skipped.c_str());
     }
   }
   for (const FoundAsset& asset : found->assets) {
     if (!asset.problem.empty()) {
       plan->push_back({asset.asset, Fail(asset.problem_code, asset.problem)});
+      continue;
+    }
+    if (!asset.file.empty()) {
+      plan->push_back({asset.asset, BrdfJob(asset.asset, asset.file)});
       continue;
     }
     Job job;
@@ -78,6 +126,11 @@ std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
   for (const std::string& input : options.inputs) {
     std::error_code ignored;
     if (std::filesystem::is_regular_file(input, ignored)) {
+      if (IsBrdfInput(input)) {
+        const std::string asset = BrdfAssetName(input);
+        plan.push_back({asset, BrdfJob(asset, input)});
+        continue;
+      }
       auto job = ReadJobFile(input);
       const std::string asset = job ? job->asset : AssetNameFromPath(input);
       plan.push_back({asset, std::move(job)});
@@ -95,6 +148,11 @@ std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
     for (Planned& planned : plan) {
       if (!maps) planned.job = Fail(maps.error());
       if (!planned.job) continue;
+      if (planned.job->kind == JobKind::kBrdf) {
+        planned.job = Fail(ErrorCode::kInvalidArgument,
+                           "--maps describes a texture set, and this is a BRDF; leave it out");
+        continue;
+      }
       planned.job->maps = *maps;
       planned.job->maps_folder = FolderOfFile(options.map_list);
     }
@@ -109,7 +167,7 @@ std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
     } else if (!taken.insert(planned.job->out + "\n" + planned.asset).second) {
       planned.job =
           Fail(ErrorCode::kConflict, "another input of this run is also named " + planned.asset +
-                                         "; rename its folder, or bake it into another --out");
+                                         "; rename one, or bake it into another --out");
     }
   }
   return plan;

@@ -14,6 +14,7 @@ int RunCommand(const CommandLine& line, const CancelToken& cancel);
 int UnpackCommand(const CommandLine& line, const CancelToken& cancel);
 int InfoCommand(const CommandLine& line);
 int CompareCommand(const CommandLine& line, const CancelToken& cancel);
+int EvalCommand(const CommandLine& line);
 int SampleCommand(const CommandLine& line);
 
 // "patina: error: <message>" on standard error.

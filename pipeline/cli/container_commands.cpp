@@ -1,13 +1,16 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "formats/base/file_io.h"
 #include "formats/container.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/compare.h"
 #include "pipeline/jobs/describe.h"
+#include "pipeline/jobs/eval_pairs.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/sample_brdf.h"
 #include "pipeline/jobs/sample_set.h"
 #include "pipeline/jobs/unpack.h"
 
@@ -83,14 +86,41 @@ int CompareCommand(const CommandLine& line, const CancelToken& cancel) {
   return kExitDone;
 }
 
+int EvalCommand(const CommandLine& line) {
+  const EvalOptions& options = line.eval;
+  auto values = EvaluatePairsFile(options.container, options.pairs);
+  if (!values) return FailCommand(values.error());
+  if (options.out.empty()) {
+    std::fputs(values->c_str(), stdout);
+    return kExitDone;
+  }
+  const Status written = WriteFileDurably(options.out, std::string_view(*values));
+  return written ? static_cast<int>(kExitDone) : FailCommand(written.error());
+}
+
 int SampleCommand(const CommandLine& line) {
   const SampleOptions& options = line.sample;
-  ThreadPool pool(line.threads);
-  SetImageIoThreads(pool.threads());
-  auto paths = WriteSampleSet(options.out, options.size, options.seed, pool);
-  if (!paths) return FailCommand(paths.error());
+  std::vector<std::string> paths;
+  if (options.kind != "brdf") {
+    ThreadPool pool(line.threads);
+    SetImageIoThreads(pool.threads());
+    auto written = WriteSampleSet(options.out, options.size, options.seed, pool);
+    if (!written) return FailCommand(written.error());
+    paths = std::move(*written);
+  }
+  if (options.kind != "material") {
+    SampleBrdfOptions brdfs;
+    brdfs.noise.seed = options.seed;
+    const bool all = options.kind == "brdf";
+    brdfs.files = all ? SampleBrdfNames() : std::vector<std::string>{"brushed.bin", "sparse.csv"};
+    // Not beside the maps: whoever bakes their folder means the material.
+    const std::string folder = all ? options.out : options.out + "/brdf";
+    const Status written = WriteSampleBrdfs(folder, brdfs);
+    if (!written) return FailCommand(written.error());
+    for (const std::string& name : brdfs.files) paths.push_back(folder + "/" + name);
+  }
   if (line.verbosity != Verbosity::kQuiet) {
-    for (const std::string& path : *paths) std::printf("%s\n", path.c_str());
+    for (const std::string& path : paths) std::printf("%s\n", path.c_str());
   }
   return kExitDone;
 }

@@ -45,6 +45,8 @@ int Dispatch(const CommandLine& line) {
       return InfoCommand(line);
     case Command::kCompare:
       return CompareCommand(line, g_cancel);
+    case Command::kEval:
+      return EvalCommand(line);
     case Command::kSample:
       return SampleCommand(line);
   }

@@ -13,30 +13,36 @@ namespace {
 
 constexpr const char* kExamples =
     "Examples:\n"
-    "  patina sample --out sample                       make a material to try things with\n"
+    "  patina sample --out sample                       make input to try things with\n"
     "  patina bake sample --out baked                   bake a folder of maps\n"
     "  patina bake textures/* --out baked --quality preview\n"
     "  patina bake wall --out baked --profile bcf-2k --min-psnr 30\n"
+    "  patina bake chrome.binary steel.bsdf --out baked bake measured BRDFs\n"
     "  patina info baked/sample                         what a container holds and how good it is\n"
     "  patina unpack baked/sample --out maps            the maps back as images\n"
     "  patina compare baked/sample sample               measure a container against its source "
     "again\n"
+    "  patina eval baked/chrome --pairs pairs.csv       values of a BRDF\n"
     "\n"
     "`patina COMMAND --help` explains a command. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 "
     "bad input,\n"
     "4 below the quality gate, 130 interrupted.";
 
 constexpr const char* kBakeFooter =
-    "INPUT is a folder of maps (found by their file names), a folder of such folders, or a job "
-    "file (see\n"
+    "INPUT is a folder of maps (found by their file names), a measured BRDF (MERL .binary, RGL "
+    ".bsdf, UTIA .bin, a\n"
+    "list of measurements as .csv or .json), a folder of both or of such folders, or a job file "
+    "(see\n"
     "schemas/job.schema.json), whose fields the options replace. One asset that fails does not "
     "stop the others; the exit\n"
     "code is that of the worst. The result is OUT/<asset>/<revision>/ with OUT/<asset>/current "
-    "pointing at it.\n"
+    "pointing at it. A BRDF's\n"
+    "asset has the name of its file. [maps] marks options that BRDFs do not have.\n"
     "\n"
     "Examples:\n"
     "  patina bake sample --out baked\n"
     "  patina bake library --out baked --quality preview --json\n"
+    "  patina bake merl/*.binary brushed.bsdf --out baked\n"
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
     "  patina bake wall --out baked --target-psnr 34 --time-budget 60 --min-psnr 30\n"
     "\n"
@@ -66,7 +72,8 @@ CLI::Range FiniteRange(double low, double high) {
   CLI::Validator& check = range;
   check.operation([low, high](std::string& text) {
     double value = 0;
-    if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
+    if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high)
+      return std::string();
     std::ostringstream out;
     out << "Value " << text << " not in range " << low << " to " << high;
     return out.str();
@@ -84,36 +91,39 @@ CLI::Option* AddOverride(CLI::App* command, const std::string& name, std::option
 }
 
 void AddBake(CLI::App* app, CommandLine* line) {
-  CLI::App* command = app->add_subcommand("bake", "Bake PBR texture sets into containers");
+  CLI::App* command =
+      app->add_subcommand("bake", "Bake PBR texture sets and measured BRDFs into containers");
   BakeOptions& o = line->bake;
-  command->add_option("INPUT", o.inputs, "Folders of maps, folders of such folders, job files")
+  command->add_option("INPUT", o.inputs, "Folders of maps, BRDF files, folders of both, job files")
       ->required();
   AddOverride(command, "-o,--out", &o.job.out,
               "Folder for the containers (needed unless every INPUT is a job file)")
       ->type_name("DIR");
-  AddOverride(command, "--profile", &o.job.profile,
-              "Size of the feature textures: 1/4, 1/2 (default) or 1 x the side of the source")
+  AddOverride(
+      command, "--profile", &o.job.profile,
+      "[maps] Size of the feature textures: 1/4, 1/2 (default) or 1 x the side of the source")
       ->check(CLI::IsMember({"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}));
   AddOverride(command, "--quality", &o.job.quality, "How long to train (default standard)")
       ->check(CLI::IsMember({"preview", "standard", "reference"}));
   AddOverride(command, "--target-psnr", &o.job.target_psnr_db,
-              "Stop once the PSNR of mip 0 is there, in dB")
+              "[maps] Stop once the PSNR of mip 0 is there, in dB")
       ->check(FiniteRange(0.0, 100.0))
       ->type_name("DB");
-  AddOverride(
-      command, "--time-budget", &o.job.time_budget_s,
-      "Aim to be done within so many seconds; the result then depends on the machine's speed")
+  AddOverride(command, "--time-budget", &o.job.time_budget_s,
+              "[maps] Aim to be done within so many seconds; the result then depends on the "
+              "machine's speed")
       ->check(FiniteRange(0.0, 1e6))
       ->type_name("S");
-  AddOverride(command, "--min-psnr", &o.job.min_psnr_db,
-              "Quality gate: publish nothing below this overall PSNR, in dB, and exit with 4")
+  AddOverride(
+      command, "--min-psnr", &o.job.min_psnr_db,
+      "[maps] Quality gate: publish nothing below this overall PSNR, in dB, and exit with 4")
       ->check(FiniteRange(0.0, 100.0))
       ->type_name("DB");
   AddOverride(command, "--recipe", &o.job.recipe,
-              "How to train: ours (default), or as Weinreich 2024 does")
+              "How to train: ours (default), or as the papers do (Weinreich 2024, Dou 2023)")
       ->check(CLI::IsMember({"patina", "paper"}));
   AddOverride(command, "--samples", &o.job.samples,
-              "Train with exactly so many samples, in place of --quality's choice")
+              "[maps] Train with exactly so many samples, in place of --quality's choice")
       ->check(FiniteRange(0.0, 1e12))
       ->type_name("N");
   AddOverride(command, "--seed", &o.job.seed, "Seed of every random choice (default 1)")
@@ -125,20 +135,20 @@ void AddBake(CLI::App* app, CommandLine* line) {
       ->type_name("N");
   command
       ->add_option("--maps", o.map_list,
-                   "List of the maps of the one INPUT, in place of finding them by name")
+                   "[maps] List of the maps of the one INPUT, in place of finding them by name")
       ->type_name("FILE.json");
   AddOverride(command, "--normal-convention", &o.job.normal_convention,
-              "Y of normal maps: up (opengl) or down (directx); default by name and content")
+              "[maps] Y of normal maps: up (opengl) or down (directx); default by name and content")
       ->check(CLI::IsMember({"auto", "opengl", "directx"}));
   AddOverride(command, "--address", &o.job.address,
-              "What lies beyond the edge (default wrap, for tiling maps)")
+              "[maps] What lies beyond the edge (default wrap, for tiling maps)")
       ->check(CLI::IsMember({"wrap", "clamp"}));
   command->add_flag(
       "--repair-nonfinite", o.job.repair_nonfinite,
-      "Replace NaN and infinite texels by their neighbours instead of refusing the file");
-  command->add_flag(
-      "--no-toksvig", o.job.no_toksvig,
-      "Do not raise the roughness of coarser mips by the variance of the normals they average");
+      "[maps] Replace NaN and infinite texels by their neighbours instead of refusing the file");
+  command->add_flag("--no-toksvig", o.job.no_toksvig,
+                    "[maps] Do not raise the roughness of coarser mips by the variance of the "
+                    "normals they average");
   AddCommon(command, line, true);
   command->footer(kBakeFooter);
   command->callback([line] { line->command = Command::kBake; });
@@ -167,7 +177,8 @@ void AddRun(CLI::App* app, CommandLine* line) {
 }
 
 void AddUnpack(CLI::App* app, CommandLine* line) {
-  CLI::App* command = app->add_subcommand("unpack", "Write the maps of a container as images");
+  CLI::App* command =
+      app->add_subcommand("unpack", "Write the maps of a material's container as images");
   UnpackOptions& o = line->unpack;
   command
       ->add_option("CONTAINER", o.container,
@@ -225,24 +236,57 @@ void AddCompare(CLI::App* app, CommandLine* line) {
   command->callback([line] { line->command = Command::kCompare; });
 }
 
-void AddSample(CLI::App* app, CommandLine* line) {
+void AddEval(CLI::App* app, CommandLine* line) {
   CLI::App* command =
-      app->add_subcommand("sample", "Make sample input: a procedural PBR texture set");
-  SampleOptions& o = line->sample;
-  command->add_option("-o,--out", o.out, "Folder for the maps and their job.json")
+      app->add_subcommand("eval", "Print values of a baked BRDF at pairs of directions");
+  EvalOptions& o = line->eval;
+  command
+      ->add_option("CONTAINER", o.container,
+                   "A container, or the folder of an asset (its current container)")
+      ->required();
+  command->add_option("--pairs", o.pairs, "Lines of wix,wiy,wiz,wox,woy,woz")
       ->required()
-      ->type_name("DIR");
-  command->add_option("--size", o.size, "Texels a side (default 1024)")
+      ->type_name("FILE.csv");
+  command->add_option("-o,--out", o.out, "Write to this file, not to standard output")
+      ->type_name("FILE.csv");
+  AddCommon(command, line, false);
+  command->footer(
+      "Directions are unit vectors, z along the normal, both pointing away from the surface. "
+      "Printed is a line r,g,b for\n"
+      "each pair: f in 1/sr, linear Rec. 709, without the cosine; 0,0,0 below the horizon.\n"
+      "Example:\n"
+      "  patina eval baked/chrome --pairs pairs.csv --out values.csv");
+  command->callback([line] { line->command = Command::kEval; });
+}
+
+void AddSample(CLI::App* app, CommandLine* line) {
+  CLI::App* command = app->add_subcommand(
+      "sample", "Make sample input: a procedural PBR texture set, and analytic BRDFs as files");
+  SampleOptions& o = line->sample;
+  command->add_option("-o,--out", o.out, "Folder for the files")->required()->type_name("DIR");
+  command
+      ->add_option("--kind", o.kind,
+                   "material: maps and a job.json; brdf: BRDF files of every format, 200 MB; all "
+                   "(default): the material, and two small BRDF files in DIR/brdf")
+      ->check(CLI::IsMember({"all", "material", "brdf"}));
+  command->add_option("--size", o.size, "Texels a side of the maps (default 1024)")
       ->check(CLI::Range(1, kMaxSampleSide))
       ->type_name("N");
-  command->add_option("--seed", o.seed, "Another seed makes another floor (default 1)")
+  command
+      ->add_option("--seed", o.seed,
+                   "Another seed makes another floor, and other noise in the measurements "
+                   "(default 1)")
       ->check(CLI::Range(uint64_t{0}, kMaxSeed))
       ->type_name("N");
   command->add_option("--threads", line->threads, "Threads (default: all CPUs)")
       ->check(CLI::Range(0, kMaxThreads));
   AddCommon(command, line, false);
   command->footer(
-      "Example:\n  patina sample --out sample --size 512\n  patina run sample/job.json");
+      "Examples:\n"
+      "  patina sample --out sample --size 512\n"
+      "  patina run sample/job.json\n"
+      "  patina sample --kind brdf --out brdfs\n"
+      "  patina bake brdfs --out baked");
   command->callback([line] { line->command = Command::kSample; });
 }
 
@@ -252,7 +296,9 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   ParsedCommandLine parsed;
   CommandLine line;
   CLI::App app(
-      "Patina bakes PBR texture sets into small neural materials that any engine can sample.",
+      "Patina bakes PBR texture sets and measured BRDFs into small neural materials that any "
+      "engine "
+      "can sample.",
       "patina");
   app.set_version_flag("--version", std::string("patina ") + PATINA_VERSION, "Print the version");
   app.require_subcommand(1);
@@ -263,6 +309,7 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   AddUnpack(&app, &line);
   AddInfo(&app, &line);
   AddCompare(&app, &line);
+  AddEval(&app, &line);
   AddSample(&app, &line);
   std::string topic;
   CLI::App* help = app.add_subcommand("help", "Explain a command");

@@ -30,7 +30,7 @@ struct JobOverrides {
 };
 
 struct BakeOptions {
-  std::vector<std::string> inputs;  // folders of maps, folders of such folders, job files
+  std::vector<std::string> inputs;  // folders, BRDF files, job files
   std::string map_list;             // --maps FILE.json, or empty
   JobOverrides job;
 };
@@ -59,13 +59,20 @@ struct CompareOptions {
   bool repair_nonfinite = false;
 };
 
+struct EvalOptions {
+  std::string container;
+  std::string pairs;
+  std::string out;  // empty: standard output
+};
+
 struct SampleOptions {
   std::string out;
+  std::string kind = "all";  // "all", "material", "brdf"
   int size = 1024;
   uint64_t seed = 1;
 };
 
-enum class Command { kBake, kRun, kUnpack, kInfo, kCompare, kSample };
+enum class Command { kBake, kRun, kUnpack, kInfo, kCompare, kEval, kSample };
 
 struct CommandLine {
   Command command = Command::kBake;
@@ -74,6 +81,7 @@ struct CommandLine {
   UnpackOptions unpack;
   InfoOptions info;
   CompareOptions compare;
+  EvalOptions eval;
   SampleOptions sample;
   bool json = false;
   Verbosity verbosity = Verbosity::kNormal;

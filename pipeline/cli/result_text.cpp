@@ -30,6 +30,17 @@ std::string ResultText(const JobResult& result) {
     for (const auto& [role, db] : result.psnr->maps) text += role + " " + Number(db, 2) + " dB, ";
     text += BytesText(static_cast<double>(result.bytes)) + ", ";
   }
+  if (result.brdf) {
+    const BrdfSummary& brdf = *result.brdf;
+    if (brdf.image_mae) {
+      text += "lit sphere MAE " + Number(*brdf.image_mae, 5) + ", RMSE " +
+              Number(brdf.image_rmse.value_or(0), 5) + ", SSIM " +
+              Number(brdf.image_ssim.value_or(0), 5) + ", ";
+    }
+    text += "log1p MAE " + Number(brdf.log1p_mae, 5) + ", reciprocity error " +
+            Number(brdf.reciprocity, 5) + "\n  " + BytesText(static_cast<double>(result.bytes)) +
+            ", ";
+  }
   text += DurationText(result.seconds) + "\n  " + result.container + "\n";
   return text;
 }

@@ -8,7 +8,7 @@
 
 namespace patina {
 
-// Two lines on a job that is done: quality, size, time and place; then the PSNR of each map.
+// A few lines on a job that is done: quality, size, time and place.
 std::string ResultText(const JobResult& result);
 
 // What became of several assets: a count, and a line for each that is not done. planned: how many

@@ -27,6 +27,12 @@ Result<Comparison> CompareContainer(const std::string& container, const Job& sou
                                     ThreadPool& pool, const CancelToken& cancel,
                                     ProgressSink& progress) {
   PATINA_ASSIGN(const Container opened, OpenContainer(container));
+  if (opened.manifest.kind != "material" || source.kind != JobKind::kMaterial) {
+    return Fail(ErrorCode::kUnsupported,
+                opened.directory +
+                    ": only materials are compared with maps; `patina info` tells "
+                    "how good a BRDF is, and `patina eval` gives its values");
+  }
   PATINA_TRY(VerifyPayloads(opened));
   Job job = source;
   job.address =

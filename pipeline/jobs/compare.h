@@ -20,7 +20,8 @@ struct Comparison {
 
 // `source` says where the maps are: folder, set or maps of a job; its other fields are not used but
 // for repair_nonfinite, toksvig and normal_convention. Addressing is the container's. Errors: those
-// of OpenContainer, VerifyPayloads, MapsOfJob, ReadSource and MeasureContainer.
+// of OpenContainer, VerifyPayloads, MapsOfJob, ReadSource and MeasureContainer; kUnsupported for a
+// BRDF.
 Result<Comparison> CompareContainer(const std::string& container, const Job& source,
                                     ThreadPool& pool, const CancelToken& cancel,
                                     ProgressSink& progress);

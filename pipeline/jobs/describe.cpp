@@ -41,11 +41,59 @@ std::string MapLine(const Manifest& manifest, const ManifestMapQuality& quality)
   return line + "\n";
 }
 
+std::string Measure(const char* name, const std::optional<double>& value) {
+  return value ? Format("  %-24s%.6f\n", name, *value) : "";
+}
+
+std::string BrdfText(const Manifest& m) {
+  const ManifestBrdf& brdf = *m.brdf;
+  std::string text =
+      Format("  BRDF from a file of format %s, %s, quality %s, recipe %s %d, seed %llu\n",
+             brdf.source_format.c_str(), brdf.isotropic ? "isotropic" : "anisotropic",
+             m.quality_setting.c_str(), m.tool.recipe.c_str(), m.tool.recipe_version,
+             static_cast<unsigned long long>(m.seed));
+  text += "\nQuality\n";
+  text += Measure("lit sphere, MAE", brdf.quality.image_mae);
+  text += Measure("lit sphere, RMSE", brdf.quality.image_rmse);
+  text += Measure("lit sphere, SSIM", brdf.quality.image_ssim);
+  text += Measure("MSE of log(1 + f)", brdf.quality.log1p_mse);
+  text += Measure("reciprocity error", brdf.quality.reciprocity_error);
+  for (const ManifestAlbedo& albedo : brdf.quality.albedo) {
+    text += Format("  albedo at %2.0f degrees    %.4f %.4f %.4f\n", albedo.theta_deg, albedo.rgb[0],
+                   albedo.rgb[1], albedo.rgb[2]);
+  }
+  text += "\nFiles\n";
+  for (const ManifestPayload& payload : m.payloads) {
+    text += Format("  %-18s%12llu bytes  %s\n", payload.name.c_str(),
+                   static_cast<unsigned long long>(payload.bytes), payload.role.c_str());
+  }
+  text += Format("  grid Nside %d, primitives of %d, %d index bits, %s%s%s\n", brdf.nside,
+                 brdf.primitive_size, brdf.index_bits, brdf.interpolation.c_str(),
+                 brdf.angle_inputs ? ", angle inputs" : "",
+                 brdf.canonical_order ? ", canonical order" : "");
+  if (!brdf.shared_codebook_file.empty())
+    text += "  codebook shared with other assets: " + brdf.shared_codebook_file + "\n";
+  text += "  network";
+  for (size_t i = 0; i < brdf.layers.size(); ++i)
+    text += (i > 0 ? " -> " : " ") + std::to_string(brdf.layers[i]);
+  text += ", " + brdf.activation + "\n";
+  text += Format("  %llu bytes for an engine to load\n",
+                 static_cast<unsigned long long>(ModelBytes(m.payloads)));
+  text += "\nSource\n";
+  for (const ManifestBrdfFile& file : brdf.files) text += "  " + file.path + "\n";
+  text += Format("  %llu colours, %llu of them not valid\n",
+                 static_cast<unsigned long long>(brdf.cells),
+                 static_cast<unsigned long long>(brdf.invalid_cells));
+  for (const std::string& warning : m.warnings) text += "Warning: " + warning + "\n";
+  return text;
+}
+
 }  // namespace
 
 std::string ContainerText(const Container& container) {
   const Manifest& m = container.manifest;
   std::string text = m.asset + "  (" + container.directory + ")\n";
+  if (m.brdf) return text + BrdfText(m);
   text += Format("  %d x %d texels, %d mips, %s, profile %s, quality %s, recipe %s %d, seed %llu\n",
                  m.source.width, m.source.height, m.source.levels, m.source.address.c_str(),
                  m.profile.c_str(), m.quality_setting.c_str(), m.tool.recipe.c_str(),

@@ -11,7 +11,7 @@ namespace patina {
 // What a container holds and how good it is, for a person: several lines.
 std::string ContainerText(const Container& container);
 
-// For machines, on one line: {"container": directory, "bytes": of features and weights, "manifest":
+// For machines, on one line: {"container": directory, "bytes": that an engine loads, "manifest":
 // {...}}, the manifest as the file has it. Errors: kNotFound, kIo, kCorruptData.
 Result<std::string> ContainerJson(const Container& container);
 

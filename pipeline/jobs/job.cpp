@@ -7,6 +7,7 @@
 #include <set>
 
 #include "formats/base/file_io.h"
+#include "pipeline/jobs/brdf_job.h"
 
 namespace patina {
 namespace {
@@ -133,7 +134,7 @@ class ObjectReader {
     *out = number;
   }
 
-  void Integer(const std::string& key, uint64_t most, uint64_t* out) {
+  void Integer(const std::string& key, uint64_t least, uint64_t most, uint64_t* out) {
     const Json* value = Find(key);
     if (value == nullptr) return;
     // JSON and its Schema know no difference between 1 and 1.0.
@@ -141,17 +142,18 @@ class ObjectReader {
     bool good = false;
     if (value->is_number_unsigned()) {
       number = value->get<uint64_t>();
-      good = number <= most;
+      good = number >= least && number <= most;
     } else if (value->is_number_integer()) {
-      good = value->get<int64_t>() == 0;  // "-0"
+      good = least == 0 && value->get<int64_t>() == 0;  // "-0"
     } else if (value->is_number_float()) {
       const double real = value->get<double>();
-      good = real >= 0 && real <= static_cast<double>(most) && real == std::floor(real);
+      good = real >= static_cast<double>(least) && real <= static_cast<double>(most) &&
+             real == std::floor(real);
       if (good) number = static_cast<uint64_t>(real);
     }
     if (!good) {
-      return Complain(key, "must be a whole number between 0 and " + std::to_string(most) +
-                               "; is " + Shown(*value));
+      return Complain(key, "must be a whole number between " + std::to_string(least) + " and " +
+                               std::to_string(most) + "; is " + Shown(*value));
     }
     *out = number;
   }
@@ -163,9 +165,14 @@ class ObjectReader {
     *out = value->get<bool>();
   }
 
+  void Refuse(const std::string& key, const std::string& why) {
+    refused_.insert(key);
+    if (object_.contains(key)) Complain(key, why);
+  }
+
   void RefuseUnknown() {
     for (const auto& [key, value] : object_.items()) {
-      if (known_.count(key) == 0)
+      if (known_.count(key) == 0 && refused_.count(key) == 0)
         Complain(key, "is not a field of this object; fields: " + Known());
     }
   }
@@ -180,7 +187,7 @@ class ObjectReader {
   const Json& object_;
   std::string pointer_;
   std::vector<std::string>* problems_;
-  std::set<std::string> known_;
+  std::set<std::string> known_, refused_;
 };
 
 std::string Join(const std::string& folder, const std::string& path) {
@@ -224,6 +231,42 @@ std::vector<JobMap> ReadMaps(const Json& list, const std::string& pointer,
   return maps;
 }
 
+void ReadInt(ObjectReader* reader, const char* key, int least, int most, std::optional<int>* out) {
+  uint64_t value = 0;
+  const Json* member = reader->Find(key);
+  if (member == nullptr) return;
+  reader->Integer(key, static_cast<uint64_t>(least), static_cast<uint64_t>(most), &value);
+  *out = static_cast<int>(value);
+}
+
+void ReadFlag(ObjectReader* reader, const char* key, std::optional<bool>* out) {
+  if (reader->Find(key) == nullptr) return;
+  bool value = false;
+  reader->Flag(key, &value);
+  *out = value;
+}
+
+JobModel ReadModel(const Json& object, std::vector<std::string>* problems) {
+  JobModel model;
+  if (!object.is_object()) {
+    problems->push_back("/model: must be an object; is " + Shown(object));
+    return model;
+  }
+  ObjectReader reader(object, "/model", problems);
+  ReadInt(&reader, "nside", 1, kMaxJobNside, &model.nside);
+  ReadInt(&reader, "primitive_size", 1, kMaxJobPrimitiveSize, &model.primitive_size);
+  ReadInt(&reader, "index_bits", 1, kMaxJobIndexBits, &model.index_bits);
+  ReadInt(&reader, "hidden", kMinJobHidden, kMaxJobHidden, &model.hidden);
+  ReadInt(&reader, "hidden_layers", 1, kMaxJobHiddenLayers, &model.hidden_layers);
+  std::string interpolation;
+  reader.Choice("interpolation", {"bilinear", "inverse_distance", "uniform"}, &interpolation);
+  if (!interpolation.empty()) model.interpolation = interpolation;
+  ReadFlag(&reader, "angle_inputs", &model.angle_inputs);
+  ReadFlag(&reader, "canonical_order", &model.canonical_order);
+  reader.RefuseUnknown();
+  return model;
+}
+
 tl::unexpected<Error> FailWithProblems(const std::string& source,
                                        const std::vector<std::string>& problems) {
   std::string message = source + ": " + std::to_string(problems.size()) +
@@ -244,7 +287,83 @@ void AssignEnum(const std::string& name, Parse parse, Enum* out) {
   if (auto value = parse(name)) *out = *value;
 }
 
+void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+  reader->Text("folder", false, 4096, &job->folder);
+  reader->Text("set", false, 255, &job->set);
+  const Json* maps = reader->Find("maps");
+  if (maps != nullptr) job->maps = ReadMaps(*maps, "/maps", problems);
+  if (reader->Find("folder") == nullptr && maps == nullptr)
+    reader->Complain("folder", "is missing: give \"folder\" or \"maps\"");
+  std::string profile, address;
+  reader->Choice("profile", {"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
+  reader->Choice("address", {"wrap", "clamp"}, &address);
+  reader->Choice("normal_convention", {"auto", "opengl", "directx"}, &job->normal_convention);
+  reader->Number("target_psnr_db", 100, &job->target_psnr_db);
+  reader->Number("time_budget_s", 1e6, &job->time_budget_s);
+  reader->Number("samples", 1e12, &job->samples);
+  reader->Number("min_psnr_db", 100, &job->min_psnr_db);
+  reader->Flag("repair_nonfinite", &job->repair_nonfinite);
+  reader->Flag("toksvig", &job->toksvig);
+  for (const char* key : {"file", "model"})
+    reader->Refuse(key, "is a field of jobs of kind \"brdf\"; this job's kind is \"material\"");
+  AssignEnum(profile, ParseProfile, &job->profile);
+  if (address == "clamp") job->address = AddressMode::kClamp;
+}
+
+void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+  reader->Text("file", true, 4096, &job->file);
+  if (const Json* model = reader->Find("model")) job->model = ReadModel(*model, problems);
+  for (const char* key :
+       {"folder", "set", "maps", "profile", "address", "normal_convention", "target_psnr_db",
+        "time_budget_s", "samples", "min_psnr_db", "repair_nonfinite", "toksvig"}) {
+    reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"brdf\"");
+  }
+}
+
+template <class T>
+void SetIf(const char* key, const std::optional<T>& value, nlohmann::ordered_json* json) {
+  if (value) (*json)["model"][key] = *value;
+}
+
+std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
+  const Job defaults;
+  json["file"] = job.file;
+  json["out"] = job.out;
+  const JobModel& model = job.model;
+  SetIf("nside", model.nside, &json);
+  SetIf("primitive_size", model.primitive_size, &json);
+  SetIf("index_bits", model.index_bits, &json);
+  SetIf("hidden", model.hidden, &json);
+  SetIf("hidden_layers", model.hidden_layers, &json);
+  SetIf("interpolation", model.interpolation, &json);
+  SetIf("angle_inputs", model.angle_inputs, &json);
+  SetIf("canonical_order", model.canonical_order, &json);
+  if (job.quality != defaults.quality) json["quality"] = QualityName(job.quality);
+  if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
+  if (job.seed != defaults.seed) json["seed"] = job.seed;
+  if (job.threads != defaults.threads) json["threads"] = job.threads;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string CanonicalBrdfJob(const Job& job, nlohmann::ordered_json json) {
+  const brdf::ModelShape shape = ModelOfJob(job);
+  json["model"] = {{"nside", shape.grid.nside},
+                   {"primitive_size", shape.primitive_size},
+                   {"index_bits", shape.index_bits},
+                   {"hidden", shape.hidden},
+                   {"hidden_layers", shape.hidden_layers},
+                   {"interpolation", InterpolationName(shape.grid.interpolation)},
+                   {"angle_inputs", shape.grid.angle_inputs},
+                   {"canonical_order", shape.grid.canonical_order}};
+  json["quality"] = QualityName(job.quality);
+  json["recipe"] = RecipeName(job.recipe);
+  json["seed"] = job.seed;
+  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+}
+
 }  // namespace
+
+const char* JobKindName(JobKind kind) { return kind == JobKind::kBrdf ? "brdf" : "material"; }
 
 const char* AddressModeName(AddressMode mode) {
   return mode == AddressMode::kWrap ? "wrap" : "clamp";
@@ -298,45 +417,38 @@ Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
     }
     if (*version != kJobVersion) reader.Complain("version", "must be 1; is " + Shown(*version));
   }
-  if (const Json* kind = reader.Find("kind", true)) {
-    if (*kind != "material") reader.Complain("kind", "must be \"material\"; is " + Shown(*kind));
-  }
-
   Job job;
+  if (const Json* kind = reader.Find("kind", true)) {
+    if (*kind == "brdf") {
+      job.kind = JobKind::kBrdf;
+    } else if (*kind != "material") {
+      reader.Complain("kind", "must be \"material\" or \"brdf\"; is " + Shown(*kind));
+    }
+  }
   reader.Text("asset", true, 100, &job.asset);
   if (!job.asset.empty() && !IsAssetName(job.asset)) {
     reader.Complain("asset", "must be made of A-Z a-z 0-9 _ - . and not start with - or '.'; is " +
                                  Shown(Json(job.asset)));
   }
-  reader.Text("folder", false, 4096, &job.folder);
-  reader.Text("set", false, 255, &job.set);
-  if (const Json* maps = reader.Find("maps")) job.maps = ReadMaps(*maps, "/maps", &problems);
-  if (!json.contains("folder") && !json.contains("maps"))
-    reader.Complain("folder", "is missing: give \"folder\" or \"maps\"");
   reader.Text("out", true, 4096, &job.out);
-  std::string profile, quality, recipe, address;
-  reader.Choice("profile", {"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
+  std::string quality, recipe;
   reader.Choice("quality", {"preview", "standard", "reference"}, &quality);
   reader.Choice("recipe", {"patina", "paper"}, &recipe);
-  reader.Choice("address", {"wrap", "clamp"}, &address);
-  reader.Choice("normal_convention", {"auto", "opengl", "directx"}, &job.normal_convention);
-  reader.Integer("seed", kMaxSeed, &job.seed);
+  reader.Integer("seed", 0, kMaxSeed, &job.seed);
   uint64_t threads = 0;
-  reader.Integer("threads", kMaxThreads, &threads);
-  reader.Number("target_psnr_db", 100, &job.target_psnr_db);
-  reader.Number("time_budget_s", 1e6, &job.time_budget_s);
-  reader.Number("samples", 1e12, &job.samples);
-  reader.Number("min_psnr_db", 100, &job.min_psnr_db);
-  reader.Flag("repair_nonfinite", &job.repair_nonfinite);
-  reader.Flag("toksvig", &job.toksvig);
+  reader.Integer("threads", 0, kMaxThreads, &threads);
+  if (job.kind == JobKind::kBrdf) {
+    ReadBrdfFields(&reader, &problems, &job);
+  } else {
+    ReadMaterialFields(&reader, &problems, &job);
+  }
   reader.RefuseUnknown();
   if (!problems.empty()) return FailWithProblems(source, problems);
 
   job.threads = static_cast<int>(threads);
-  AssignEnum(profile, ParseProfile, &job.profile);
   AssignEnum(quality, ParseQuality, &job.quality);
   AssignEnum(recipe, ParseRecipe, &job.recipe);
-  if (address == "clamp") job.address = AddressMode::kClamp;
+  job.file = Join(base_folder, job.file);
   job.folder = Join(base_folder, job.folder);
   job.out = Join(base_folder, job.out);
   job.maps_folder = job.folder.empty() ? base_folder : job.folder;
@@ -361,8 +473,9 @@ std::string JobToJson(const Job& job) {
   const Job defaults;
   nlohmann::ordered_json json;
   json["version"] = kJobVersion;
-  json["kind"] = "material";
+  json["kind"] = JobKindName(job.kind);
   json["asset"] = job.asset;
+  if (job.kind == JobKind::kBrdf) return BrdfJobToJson(job, std::move(json));
   if (!job.folder.empty()) json["folder"] = job.folder;
   if (!job.set.empty()) json["set"] = job.set;
   for (const JobMap& map : job.maps) {
@@ -396,8 +509,9 @@ std::string JobToJson(const Job& job) {
 std::string CanonicalJob(const Job& job) {
   nlohmann::ordered_json json;
   json["version"] = kJobVersion;
-  json["kind"] = "material";
+  json["kind"] = JobKindName(job.kind);
   json["asset"] = job.asset;
+  if (job.kind == JobKind::kBrdf) return CanonicalBrdfJob(job, std::move(json));
   json["maps"] = nlohmann::ordered_json::array();
   for (const JobMap& map : job.maps) {
     json["maps"].push_back({{"role", map.role},

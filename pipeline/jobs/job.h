@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,20 +30,40 @@ struct JobMap {
   bool invert = false;               // the file holds 1 - value
 };
 
+// The shape of a BRDF's model. What is absent is the recipe's choice (see ModelOfJob in
+// brdf_job.h).
+struct JobModel {
+  std::optional<int> nside;                  // 1..256
+  std::optional<int> primitive_size;         // 1..64
+  std::optional<int> index_bits;             // 1..12
+  std::optional<int> hidden;                 // 4..256
+  std::optional<int> hidden_layers;          // 1..4
+  std::optional<std::string> interpolation;  // "bilinear", "inverse_distance", "uniform"
+  std::optional<bool> angle_inputs;
+  std::optional<bool> canonical_order;
+};
+
+enum class JobKind { kMaterial, kBrdf };  // "material", "brdf"
+
+// Fields marked [material] or [brdf] belong to jobs of that kind only.
 struct Job {
+  JobKind kind = JobKind::kMaterial;
   std::string asset;
-  std::string folder;  // of the maps; may be empty when `maps` is not
-  std::string set;     // name of the one meant when `folder` holds several materials; may be empty
-                       // when it does not
-  std::vector<JobMap> maps;  // empty: found by file name in `folder`
-  std::string
-      maps_folder;  // what files of `maps` are relative to: `folder`, or the job file's folder
+  std::string file;    // [brdf] the table or list of measurements
+  JobModel model;      // [brdf]
+  std::string folder;  // [material] of the maps; may be empty when `maps` is not
+  std::string set;  // [material] name of the one meant when `folder` holds several materials; may
+                    // be empty when it does not
+  std::vector<JobMap> maps;  // [material] empty: found by file name in `folder`
+  std::string maps_folder;  // [material] what files of `maps` are relative to: `folder`, or the job
+                            // file's folder
   std::string out;
-  Profile profile = Profile::kBcf1k;
+  Profile profile = Profile::kBcf1k;  // [material]
   Quality quality = Quality::kStandard;
   Recipe recipe = Recipe::kPatina;
   uint64_t seed = 1;
-  int threads = 0;            // 0: one for each CPU this process may use
+  int threads = 0;  // 0: one for each CPU this process may use
+  // [material], all that follow.
   double target_psnr_db = 0;  // 0: none
   double time_budget_s = 0;   // 0: none
   double samples = 0;         // 0: by quality and size
@@ -75,7 +96,8 @@ std::string JobToJson(const Job& job);
 // What of a job decides the bytes of its result, as text for the fingerprint: every field with its
 // value in a fixed order, without the folder and set it reads and the folder it writes to, the
 // thread count and the quality gate. Files of `maps` stand as their last path component; their
-// content enters the fingerprint by hash.
+// content, and that of `file`, enters the fingerprint by hash. The model of a BRDF stands with what
+// the recipe chose.
 std::string CanonicalJob(const Job& job);
 
 // Whether a name can be an asset's: 1 to 100 of A-Z a-z 0-9 _ - . and not starting with - or '.'.
@@ -86,5 +108,6 @@ bool IsAssetName(std::string_view name);
 std::string AssetNameFromPath(const std::string& path);
 
 const char* AddressModeName(AddressMode mode);  // "wrap", "clamp"
+const char* JobKindName(JobKind kind);          // "material", "brdf"
 
 }  // namespace patina

@@ -22,6 +22,12 @@ const char* StatusName(int exit_code) {
 
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
+Json BrdfJson(const BrdfSummary& brdf) {
+  return {{"image_mae", OrNull(brdf.image_mae)},   {"image_rmse", OrNull(brdf.image_rmse)},
+          {"image_ssim", OrNull(brdf.image_ssim)}, {"log1p_mae", brdf.log1p_mae},
+          {"reciprocity", brdf.reciprocity},       {"albedo", brdf.albedo}};
+}
+
 }  // namespace
 
 std::string JobResultToJson(const JobResult& result, int indent) {
@@ -39,8 +45,8 @@ std::string JobResultToJson(const JobResult& result, int indent) {
   if (!result.container.empty()) json["container"] = result.container;
   if (!result.revision.empty()) json["revision"] = result.revision;
   if (!result.fingerprint.empty()) json["fingerprint"] = result.fingerprint;
-  if (!result.profile.empty()) {
-    json["profile"] = result.profile;
+  if (!result.profile.empty()) json["profile"] = result.profile;
+  if (!result.quality.empty()) {
     json["quality"] = result.quality;
     json["recipe"] = result.recipe;
     json["seed"] = result.seed;
@@ -51,8 +57,9 @@ std::string JobResultToJson(const JobResult& result, int indent) {
     json["samples"] = result.samples;
     json["stopped_by"] = result.stopped_by;
   }
+  if (result.psnr || result.brdf) json["bytes"] = result.bytes;
+  if (result.brdf) json["brdf"] = BrdfJson(*result.brdf);
   if (result.psnr) {
-    json["bytes"] = result.bytes;
     Json maps = Json::object();
     for (const auto& [role, db] : result.psnr->maps) maps[role] = db;
     json["psnr"] = {{"overall", result.psnr->overall_db},

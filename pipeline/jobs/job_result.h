@@ -2,6 +2,7 @@
 // schemas/result.schema.json.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -31,6 +32,17 @@ struct PsnrSummary {
       maps;  // role -> dB over all mips, in the manifest's order
 };
 
+// Colatitudes of the incoming light at which the albedo of a BRDF is measured, degrees.
+inline constexpr std::array<double, 5> kAlbedoDegrees = {0, 30, 60, 80, 89};
+
+// How good a baked BRDF is; see schemas/result.schema.json and MeasureBrdf.
+struct BrdfSummary {
+  std::optional<double> image_mae, image_rmse, image_ssim;  // absent for a list of measurements
+  double log1p_mae = 0;
+  double reciprocity = 0;
+  std::array<std::array<double, 3>, kAlbedoDegrees.size()> albedo{};
+};
+
 struct JobResult {
   int exit_code = kExitDone;
   std::optional<Error> error;  // set exactly when exit_code is not kExitDone
@@ -39,15 +51,17 @@ struct JobResult {
   std::string container;    // folder of the published container, or of the rejected one; else empty
   std::string revision;     // empty if not published
   std::string fingerprint;  // empty if the input could not be read
-  std::string profile, quality, recipe;
+  std::string profile;      // of materials
+  std::string quality, recipe;
   uint64_t seed = 0;
   double seconds = 0;
   double cpu_seconds = 0;
   double samples = 0;
   std::string stopped_by;
-  uint64_t bytes = 0;  // of features and weights
+  uint64_t bytes = 0;  // of what an engine loads
   std::optional<PsnrSummary> psnr;
   std::optional<double> ssim, flip, normal_angle_deg;
+  std::optional<BrdfSummary> brdf;
   std::vector<std::string> warnings;
 };
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+
+#include "pipeline/jobs/brdf_files.h"
 
 namespace patina {
 namespace {
@@ -37,6 +40,35 @@ void AddSets(const std::string& folder, const std::vector<MapSet>& sets, FoundAs
     asset.asset = AssetNameFromPath(set.name);
     asset.folder = folder;
     if (sets.size() > 1) asset.set = set.name;
+    found->assets.push_back(std::move(asset));
+  }
+}
+
+void AddProblem(const std::string& folder, const Error& error, FoundAssets* found) {
+  FoundAsset asset;
+  asset.asset = AssetNameFromPath(folder);
+  asset.folder = folder;
+  asset.problem = error.message;
+  asset.problem_code = error.code;
+  found->assets.push_back(std::move(asset));
+}
+
+// Adds the BRDF files of a folder whose other assets are those from `first` on.
+void AddBrdfs(const std::string& folder, const std::vector<std::string>& files, size_t first,
+              FoundAssets* found) {
+  std::map<std::string, int> uses;
+  for (size_t i = first; i < found->assets.size(); ++i) ++uses[found->assets[i].asset];
+  for (const std::string& file : files) ++uses[BrdfAssetName(file)];
+  for (const std::string& file : files) {
+    FoundAsset asset;
+    asset.asset = BrdfAssetName(file);
+    if (uses[asset.asset] > 1) {
+      std::string name = fs::path(file).filename().string();
+      std::replace(name.begin(), name.end(), '.', '_');
+      asset.asset = AssetNameFromPath(name);
+    }
+    asset.folder = folder;
+    asset.file = file;
     found->assets.push_back(std::move(asset));
   }
 }
@@ -98,38 +130,48 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
   std::error_code error;
   const fs::file_status status = fs::status(folder, error);
   if (!fs::exists(status))
-    return Fail(ErrorCode::kNotFound, "there is no folder " + folder + "; check the path");
+    return Fail(ErrorCode::kNotFound, "there is no folder or file " + folder + "; check the path");
   if (!fs::is_directory(status)) {
     return Fail(ErrorCode::kInvalidArgument,
-                folder + " is neither a folder nor a job file (*.json)");
+                folder + " is neither a folder nor a job file (*.json) nor a BRDF file");
   }
   FoundAssets found;
+  PATINA_ASSIGN(const std::vector<std::string> brdfs, FindBrdfFiles(folder));
   auto sets = FindMaps(folder);
   if (sets) {
     AddSets(folder, *sets, &found);
+    AddBrdfs(folder, brdfs, 0, &found);
     return found;
   }
-  if (sets.error().code != ErrorCode::kNotFound) return Fail(sets.error());
+  if (sets.error().code != ErrorCode::kNotFound) {
+    if (brdfs.empty()) return Fail(sets.error());
+    AddProblem(folder, sets.error(), &found);
+    AddBrdfs(folder, brdfs, 0, &found);
+    return found;
+  }
 
+  AddBrdfs(folder, brdfs, 0, &found);
   PATINA_ASSIGN(const Folder content, ListFolder(folder));
   for (const std::string& subfolder : content.subfolders) {
     if (SameFolder(subfolder, except)) continue;
+    const size_t first = found.assets.size();
+    auto inner_brdfs = FindBrdfFiles(subfolder);
+    const std::vector<std::string> files = inner_brdfs ? *inner_brdfs : std::vector<std::string>();
     auto inner = FindMaps(subfolder);
     if (inner) {
       AddSets(subfolder, *inner, &found);
-      continue;
+    } else {
+      auto listed = ListFolder(subfolder);
+      const bool no_images = listed && !listed->has_images;
+      if (no_images && files.empty()) {
+        found.skipped.push_back(subfolder);
+        continue;
+      }
+      // Beside BRDF files, images that are no maps are pictures of them.
+      if (!no_images && (files.empty() || inner.error().code != ErrorCode::kNotFound))
+        AddProblem(subfolder, inner.error(), &found);
     }
-    auto listed = ListFolder(subfolder);
-    if (listed && !listed->has_images) {
-      found.skipped.push_back(subfolder);
-      continue;
-    }
-    FoundAsset asset;
-    asset.asset = AssetNameFromPath(subfolder);
-    asset.folder = subfolder;
-    asset.problem = inner.error().message;
-    asset.problem_code = inner.error().code;
-    found.assets.push_back(std::move(asset));
+    AddBrdfs(subfolder, files, first, &found);
   }
   if (found.assets.empty()) return Fail(sets.error());
   return found;

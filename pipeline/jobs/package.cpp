@@ -14,25 +14,6 @@ constexpr const char* kWeightsName = "decoder.weights";
 
 std::string FeatureName(int texture) { return "features_" + std::to_string(texture) + ".dds"; }
 
-Status AsInternal(Status status) {
-  if (!status && status.error().code == ErrorCode::kInvalidArgument)
-    status.error().code = ErrorCode::kInternal;
-  return status;
-}
-
-// A source file's name as the manifest takes it.
-std::string ManifestPath(const std::string& file) {
-  if (CheckRelativePath(file, "")) return file;
-  std::string name = std::filesystem::path(file).filename().string();
-  for (char& c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       c == '-' || c == '.';
-    if (!plain) c = '_';
-  }
-  if (name.size() > 100) name = name.substr(name.size() - 100);
-  return CheckRelativePath(name, "") ? name : "file_" + name;
-}
-
 std::string Shortest(float value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", static_cast<double>(value));
@@ -106,6 +87,24 @@ void DescribeModel(const TrainedMaterial& model, Manifest* manifest) {
 }
 
 }  // namespace
+
+std::string ManifestPath(const std::string& file) {
+  if (CheckRelativePath(file, "")) return file;
+  std::string name = std::filesystem::path(file).filename().string();
+  for (char& c : name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '.';
+    if (!plain) c = '_';
+  }
+  if (name.size() > 100) name = name.substr(name.size() - 100);
+  return CheckRelativePath(name, "") ? name : "file_" + name;
+}
+
+Status AsInternal(Status status) {
+  if (!status && status.error().code == ErrorCode::kInvalidArgument)
+    status.error().code = ErrorCode::kInternal;
+  return status;
+}
 
 Status AddModel(const TrainedMaterial& model, StagingArea* staging) {
   for (int t = 0; t < kFeatureTextures; ++t) {
@@ -205,7 +204,9 @@ void DescribeQuality(const Job& job, const Measurement& measurement, Manifest* m
 uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads) {
   uint64_t bytes = 0;
   for (const ManifestPayload& payload : payloads) {
-    if (payload.role == "features" || payload.role == "weights") bytes += payload.bytes;
+    for (const char* role : {"features", "grid", "codebook", "weights", "sampler"}) {
+      if (payload.role == role) bytes += payload.bytes;
+    }
   }
   return bytes;
 }

@@ -23,7 +23,14 @@ Manifest DescribeContainer(const Job& job, const JobSource& source, const Traine
 // Fills in manifest.quality; the gate is job.min_psnr_db.
 void DescribeQuality(const Job& job, const Measurement& measurement, Manifest* manifest);
 
-// Bytes of the payloads that an engine loads: features and weights.
+// A source file's name as a manifest takes it: the same, or a similar one that can stand there.
+std::string ManifestPath(const std::string& file);
+
+// kInvalidArgument becomes kInternal: what was trained must be writable.
+Status AsInternal(Status status);
+
+// Bytes of the payloads that an engine loads: feature textures, index grid, codebook, weights,
+// sampler.
 uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads);
 
 }  // namespace patina

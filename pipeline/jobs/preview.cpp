@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "pipeline/color/color.h"
-#include "pipeline/jobs/pixel_font.h"
 #include "pipeline/metrics/normal_angle.h"
 
 namespace patina {
@@ -15,13 +14,6 @@ using metrics::MapKind;
 using metrics::PlanarView;
 using metrics::PlanePair;
 using Rgb = std::array<float, 3>;
-
-constexpr int kGap = 10;
-constexpr int kLabelHeight = 2 * kGlyphHeight + 6;
-constexpr int kColumns = 5;
-constexpr int kTextScale = 2;
-constexpr float kBackground = 0.11f;
-constexpr float kInk = 0.86f;
 
 // One side (reference or test) of the channels of a map.
 struct Side {
@@ -54,29 +46,6 @@ struct Side {
 
 RgbImage MakeImage(int width, int height, float grey) {
   return {width, height, std::vector<float>(static_cast<size_t>(width) * height * 3, grey)};
-}
-
-void Paste(const RgbImage& picture, int left, int top, RgbImage* sheet) {
-  for (int y = 0; y < picture.height; ++y) {
-    const float* from = picture.rgb.data() + static_cast<size_t>(y) * picture.width * 3;
-    float* to = sheet->rgb.data() + (static_cast<size_t>(top + y) * sheet->width + left) * 3;
-    for (int i = 0; i < 3 * picture.width; ++i) to[i] = std::clamp(from[i], 0.0f, 1.0f);
-  }
-}
-
-void Write(std::string_view text, int left, int top, RgbImage* sheet) {
-  for (size_t i = 0; i < text.size(); ++i) {
-    for (int y = 0; y < kGlyphHeight * kTextScale; ++y) {
-      for (int x = 0; x < kGlyphWidth * kTextScale; ++x) {
-        const int column = left + static_cast<int>(i) * kGlyphWidth * kTextScale + x;
-        if (column >= sheet->width || top + y >= sheet->height) continue;
-        if (!GlyphPixel(text[i], x / kTextScale, y / kTextScale)) continue;
-        float* pixel =
-            sheet->rgb.data() + (static_cast<size_t>(top + y) * sheet->width + column) * 3;
-        std::fill(pixel, pixel + 3, kInk);
-      }
-    }
-  }
 }
 
 }  // namespace
@@ -134,7 +103,7 @@ void Preview::Capture(std::span<const metrics::QualityMap> maps, int width, int 
         for (size_t c = 0; c < 3; ++c) {
           row.source.rgb[at + c] = a[c] * scale;
           row.decoded.rgb[at + c] = b[c] * scale;
-          row.difference.rgb[at + c] = kDifferenceGain * d[c] * scale;
+          row.difference.rgb[at + c] = kSheetDifferenceGain * d[c] * scale;
         }
       }
     });
@@ -154,26 +123,16 @@ void Preview::Capture(std::span<const metrics::QualityMap> maps, int width, int 
 }
 
 RgbImage Preview::Compose(const std::string& title, std::span<const std::string> labels) const {
-  const int row_height =
-      rows_.empty() ? 0 : std::max(rows_[0].source.height, rows_[0].source_detail.height);
-  const int width = kColumns * (kTile + kGap) + kGap;
-  const int top = kGap + 2 * kLabelHeight;
-  const int height = top + static_cast<int>(rows_.size()) * (kLabelHeight + row_height + kGap);
-  RgbImage sheet = MakeImage(width, height, kBackground);
-  Write(title, kGap, kGap, &sheet);
-  static constexpr std::string_view kHeads[kColumns] = {"source", "decoded", "difference x8",
-                                                        "source 1:1", "decoded 1:1"};
-  for (int c = 0; c < kColumns; ++c)
-    Write(kHeads[c], kGap + c * (kTile + kGap), kGap + kLabelHeight, &sheet);
+  static const std::string kHeads[] = {"source", "decoded", "difference x8", "source 1:1",
+                                       "decoded 1:1"};
+  std::vector<SheetRow> rows;
   for (size_t i = 0; i < rows_.size(); ++i) {
-    const int y = top + static_cast<int>(i) * (kLabelHeight + row_height + kGap);
-    if (i < labels.size()) Write(labels[i], kGap, y, &sheet);
-    const RgbImage* pictures[kColumns] = {&rows_[i].source, &rows_[i].decoded, &rows_[i].difference,
-                                          &rows_[i].source_detail, &rows_[i].decoded_detail};
-    for (int c = 0; c < kColumns; ++c)
-      Paste(*pictures[c], kGap + c * (kTile + kGap), y + kLabelHeight, &sheet);
+    const Row& row = rows_[i];
+    rows.push_back(
+        {i < labels.size() ? labels[i] : "",
+         {&row.source, &row.decoded, &row.difference, &row.source_detail, &row.decoded_detail}});
   }
-  return sheet;
+  return ComposeSheet(title, kHeads, rows);
 }
 
 }  // namespace patina

@@ -7,24 +7,17 @@
 #include <vector>
 
 #include "pipeline/base/thread_pool.h"
+#include "pipeline/jobs/sheet.h"
 #include "pipeline/metrics/quality.h"
 
 namespace patina {
 
-// An image for a person: sRGB-coded, row-major, three interleaved channels in [0,1].
-struct RgbImage {
-  int width = 0;
-  int height = 0;
-  std::vector<float> rgb;
-};
-
 // Collects small pictures of mip 0 while it is in memory, and lays them out once the measures are
-// known. Columns: source, decoded and difference (times kDifferenceGain) reduced to at most kTile
-// texels a side, then source and decoded texel for texel from the middle of the texture.
+// known. Columns: source, decoded and difference (times kSheetDifferenceGain) reduced to at most
+// kTile texels a side, then source and decoded texel for texel from the middle of the texture.
 class Preview {
  public:
-  static constexpr int kTile = 192;
-  static constexpr float kDifferenceGain = 8;
+  static constexpr int kTile = kSheetTile;
 
   // planes: those of `maps` in order, as QualityMeter::AddLevel takes them, of mip 0.
   void Capture(std::span<const metrics::QualityMap> maps, int width, int height,

@@ -26,12 +26,10 @@ std::string RunRecordToJson(const RunRecord& record) {
         {{"stage", stage.stage}, {"seconds", stage.seconds}, {"cpu_seconds", stage.cpu_seconds}});
   }
   json["curve"] = Json::array();
-  for (const CurvePoint& point : record.curve) {
-    json["curve"].push_back({{"samples", point.samples},
-                             {"seconds", point.wall_s},
-                             {"cpu_seconds", point.cpu_s},
-                             {"psnr_mip0_db", point.psnr_mip0_db},
-                             {"psnr_mean_mips_db", point.psnr_mean_mips_db}});
+  for (const RunCurvePoint& point : record.curve) {
+    Json entry{{"samples", point.samples}, {"seconds", point.seconds}};
+    for (const auto& [name, value] : point.measures) entry[name] = value;
+    json["curve"].push_back(std::move(entry));
   }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

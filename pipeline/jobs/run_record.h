@@ -4,9 +4,8 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
-
-#include "pipeline/material/train.h"
 
 namespace patina {
 
@@ -14,6 +13,13 @@ struct StageCost {
   std::string stage;
   double seconds = 0;
   double cpu_seconds = 0;
+};
+
+// What a training had reached at some moment; the measures are those of the job's kind, by name.
+struct RunCurvePoint {
+  double samples = 0;
+  double seconds = 0;  // from the start of the training
+  std::vector<std::pair<const char*, double>> measures;
 };
 
 struct RunRecord {
@@ -30,7 +36,7 @@ struct RunRecord {
   double samples = 0;
   double samples_per_s = 0;  // of the train stage as a whole
   std::vector<StageCost> stages;
-  std::vector<CurvePoint> curve;  // accuracy against time; seconds from the start of the training
+  std::vector<RunCurvePoint> curve;
 };
 
 std::string RunRecordToJson(const RunRecord& record);

@@ -95,6 +95,12 @@ WriteFormat FormatFor(UnpackFormat format, const std::string& source_type) {
 Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder, int mip,
                                  UnpackFormat format, ThreadPool& pool, const CancelToken& cancel) {
   PATINA_ASSIGN(const Container opened, OpenContainer(container));
+  if (opened.manifest.kind != "material") {
+    return Fail(ErrorCode::kUnsupported,
+                opened.directory +
+                    ": holds a measured BRDF, which has no maps; `patina eval` gives "
+                    "its values, and its preview.png shows it");
+  }
   PATINA_TRY(VerifyPayloads(opened));
   Decoder decoder;
   std::string problem;

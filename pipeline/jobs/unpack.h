@@ -25,6 +25,7 @@ struct Unpacked {
 // each map into `folder` (made if missing), named by role: albedo.png, normal.png, ao.png ... in
 // the size of that mip. Normals are 0.5 + 0.5 n of x, y, z, OpenGL, in both formats. Existing files
 // of those names are replaced. Errors: those of OpenContainer, VerifyPayloads and the decoder;
+// kUnsupported for a BRDF;
 // kOutOfRange for a mip the source does not have; kCancelled, kIo, kResourceExhausted.
 Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder, int mip,
                                  UnpackFormat format, ThreadPool& pool, const CancelToken& cancel);

@@ -40,8 +40,9 @@ HEAVY_HEADERS = {
 # Standard headers that g++ 12 and clang 14 do not both have.
 MISSING_HEADERS = {"expected", "format", "generator", "mdspan", "print", "ranges", "source_location", "stacktrace"}
 
-# Headers that users copy: one file each, however long, and a test includes them by their bare name as a user does.
-STANDALONE = {"formats/decoder/patina_decoder.h"}
+# Headers that users copy, however long. Their tests, as users do, and they themselves include them by their bare names.
+STANDALONE = {"formats/decoder/patina_brdf_decoder.h", "formats/decoder/patina_brdf_sampler.h",
+              "formats/decoder/patina_decoder.h"}
 
 MAX_LINES = 800
 CPP_SUFFIXES = (".h", ".cpp", ".inl")
@@ -113,7 +114,7 @@ def include_direction(tree, report):
         for number, quoted, name in tree.includes(path):
             if not quoted:
                 continue
-            if parts[0] == "tests" and name in {os.path.basename(header) for header in STANDALONE}:
+            if (parts[0] == "tests" or path in STANDALONE) and name in {os.path.basename(header) for header in STANDALONE}:
                 continue
             if not os.path.isfile(os.path.join(tree.root, name)):
                 report(path, number, f'"{name}" is not a path from the project root')

@@ -110,6 +110,8 @@ class LintTest(unittest.TestCase):
                                         "tests/copy_test.cpp": '#include "patina_decoder.h"\n'}), [])
         self.expect("include_direction", "formats/bad.cpp", 1, {"formats/decoder/patina_decoder.h": "",
                                                                 "formats/bad.cpp": '#include "patina_decoder.h"\n'})
+        self.assertEqual(self.findings({"formats/decoder/patina_brdf_decoder.h": '#include "patina_brdf_sampler.h"\n',
+                                        "formats/decoder/patina_brdf_sampler.h": ""}), [])
 
     def test_schemas_that_are_not_json(self):
         self.expect("schemas_are_json", "schemas/a.json", 2, {"schemas/a.json": '{"a": 1,\n}'})

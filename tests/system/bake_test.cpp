@@ -31,8 +31,8 @@ using testing_support::TempFolder;
 using Json = nlohmann::json;
 
 void MakeSample(const std::string& folder, int size = 64) {
-  const Outcome made =
-      Patina({"sample", "--out", folder, "--size", std::to_string(size), "--quiet"});
+  const Outcome made = Patina(
+      {"sample", "--kind", "material", "--out", folder, "--size", std::to_string(size), "--quiet"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
 }
 
@@ -339,8 +339,9 @@ TEST(Publish, AWriteThatFailsLeavesTheEarlierContainer) {
             0);
   const auto before = Snapshot(folder / "out");
   for (const uint64_t limit : {100u, 2000u, 20000u}) {
+    // Quiet, because the limit holds for the file that catches the messages too.
     const Outcome outcome =
-        Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--seed", "2"}),
+        Patina(Preview({"bake", folder / "floor", "--out", folder / "out", "--seed", "2", "-q"}),
                {.max_file_bytes = limit});
     EXPECT_EQ(outcome.exit_code, 1) << limit << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("patina: error: floor: ")) << limit;
@@ -585,11 +586,18 @@ TEST_F(Baked, DescribesItself) {
 
 TEST(Sample, IsTheSameForASeed) {
   TempFolder folder;
-  ASSERT_EQ(Patina({"sample", "--out", folder / "a", "--size", "32", "--threads", "1"}).exit_code,
+  ASSERT_EQ(Patina({"sample", "--kind", "material", "--out", folder / "a", "--size", "32",
+                    "--threads", "1"})
+                .exit_code,
             0);
-  ASSERT_EQ(Patina({"sample", "--out", folder / "b", "--size", "32", "--threads", "2"}).exit_code,
+  ASSERT_EQ(Patina({"sample", "--kind", "material", "--out", folder / "b", "--size", "32",
+                    "--threads", "2"})
+                .exit_code,
             0);
-  ASSERT_EQ(Patina({"sample", "--out", folder / "c", "--size", "32", "--seed", "2"}).exit_code, 0);
+  ASSERT_EQ(
+      Patina({"sample", "--kind", "material", "--out", folder / "c", "--size", "32", "--seed", "2"})
+          .exit_code,
+      0);
   EXPECT_TRUE(Snapshot(folder / "a") == Snapshot(folder / "b"));
   EXPECT_FALSE(Snapshot(folder / "a") == Snapshot(folder / "c"));
 }

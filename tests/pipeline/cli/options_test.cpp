@@ -105,6 +105,16 @@ TEST(ParseCommandLine, ReadsTheOtherCommands) {
   ASSERT_TRUE(sample.command);
   EXPECT_EQ(sample.command->sample.size, 256);
   EXPECT_EQ(sample.command->sample.seed, 4u);
+  EXPECT_EQ(sample.command->sample.kind, "all");
+  const ParsedCommandLine brdfs = Parse({"sample", "--out", "d", "--kind", "brdf"});
+  ASSERT_TRUE(brdfs.command);
+  EXPECT_EQ(brdfs.command->sample.kind, "brdf");
+  const ParsedCommandLine eval = Parse({"eval", "c", "--pairs", "p.csv", "--out", "v.csv"});
+  ASSERT_TRUE(eval.command);
+  EXPECT_EQ(eval.command->command, Command::kEval);
+  EXPECT_EQ(eval.command->eval.container, "c");
+  EXPECT_EQ(eval.command->eval.pairs, "p.csv");
+  EXPECT_EQ(eval.command->eval.out, "v.csv");
 }
 
 TEST(ParseCommandLine, AnswersAMistakeWithTheOptionAndWhereToLook) {

@@ -5,7 +5,9 @@
 
 #include <filesystem>
 
+#include "formats/base/file_io.h"
 #include "pipeline/image/image_io.h"
+#include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/ingest.h"
 
 namespace patina {
@@ -32,6 +34,11 @@ class JobSets : public testing::Test {
     const Status written =
         WriteImage(folder_ + "/" + name, WriteFormat::kPng8, 4, 4, 3, values.data());
     ASSERT_TRUE(written) << written.error().message;
+  }
+
+  void Text(const std::string& name, const std::string& text) {
+    fs::create_directories(fs::path(folder_ + "/" + name).parent_path());
+    ASSERT_TRUE(WriteFileDurably(folder_ + "/" + name, std::string_view(text)));
   }
 
   Job JobFor(const std::string& subfolder) const {
@@ -147,6 +154,61 @@ TEST_F(JobSets, TheFingerprintFollowsContentAndNotPlace) {
   EXPECT_NE(FingerprintOfJob(JobFor("/two")), one) << "the same bytes, read another way";
   Image("one/x_roughness.png", 0.9f);
   EXPECT_NE(FingerprintOfJob(JobFor("/one")), one);
+}
+
+TEST_F(JobSets, BrdfFilesStandBesideTheSetsOfAFolder) {
+  Image("mixed/wall_albedo.png");
+  Text("mixed/chrome.binary", "");
+  Text("mixed/brushed.bsdf", "");
+  Text("mixed/brushed.csv", "wix,wiy,wiz,wox,woy,woz,r,g,b\n");
+  Text("mixed/list.json", R"({"samples": []})");
+  Text("mixed/.hidden.binary", "");
+  // What other programs leave in a folder of textures.
+  Text("mixed/buffer.bin", "geometry");
+  Text("mixed/licences.csv", "file,author\n");
+  Text("mixed/job.json", R"({"version": 1, "kind": "material", "samples": 0})");
+  auto found = FindAssets(folder_ + "/mixed", "");
+  ASSERT_TRUE(found) << found.error().message;
+  std::vector<std::string> names;
+  for (const FoundAsset& asset : found->assets) {
+    EXPECT_EQ(asset.problem, "");
+    EXPECT_EQ(asset.file.empty(), asset.asset == "mixed");
+    names.push_back(asset.asset);
+  }
+  EXPECT_THAT(names,
+              testing::ElementsAre("mixed", "brushed_bsdf", "brushed_csv", "chrome", "list"));
+}
+
+TEST_F(JobSets, AFolderOfBrdfsAndOfFoldersIsBoth) {
+  Text("library/chrome.binary", "");
+  Image("library/wall/wall_albedo.png");
+  Text("library/measured/steel.bsdf", "");
+  Image("library/measured/photo.png");
+  fs::create_directories(folder_ + "/library/nothing");
+  auto found = FindAssets(folder_ + "/library", "");
+  ASSERT_TRUE(found) << found.error().message;
+  std::vector<std::string> names;
+  for (const FoundAsset& asset : found->assets) names.push_back(asset.asset + asset.problem);
+  EXPECT_THAT(names, testing::ElementsAre("chrome", "steel", "wall"));
+  ASSERT_EQ(found->skipped.size(), 1u);
+  EXPECT_THAT(found->skipped[0], HasSubstr("nothing"));
+}
+
+TEST_F(JobSets, AListOfMeasurementsIsToldFromAJob) {
+  for (const auto& [text, is_list] : {std::pair(R"({"samples": [{"wi": [0, 0, 1]}]})", true),
+                                      {R"({"isotropic": false, "samples": []})", true},
+                                      {R"({"samples": [{"kind": 1, "version": 2}]})", true},
+                                      {R"({"samples": [{"wi": [0,)", true},
+                                      {R"({"samples": [], "kind": "brdf"})", false},
+                                      {R"({"version": 1, "samples": 0})", false},
+                                      {R"({"a": {"samples": []}})", false},
+                                      {R"([{"samples": []}])", false},
+                                      {"", false},
+                                      {"samples", false}}) {
+    Text("x.json", text);
+    EXPECT_EQ(IsMeasurementList(folder_ + "/x.json"), is_list) << text;
+  }
+  EXPECT_FALSE(IsMeasurementList(folder_ + "/nowhere.json"));
 }
 
 }  // namespace

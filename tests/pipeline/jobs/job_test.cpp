@@ -8,6 +8,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/schema_check.h"
+#include "pipeline/jobs/brdf_job.h"
 
 namespace patina {
 namespace {
@@ -21,6 +22,10 @@ std::string Example(const std::string& name) {
 
 Json Minimal() {
   return {{"version", 1}, {"kind", "material"}, {"asset", "a"}, {"folder", "f"}, {"out", "o"}};
+}
+
+Json MinimalBrdf() {
+  return {{"version", 1}, {"kind", "brdf"}, {"asset", "a"}, {"file", "f.binary"}, {"out", "o"}};
 }
 
 // What the parser says to the minimal job with one field changed; "" if it accepts it.
@@ -72,13 +77,67 @@ TEST(ParseJob, ReadsEveryFieldOfTheFullExample) {
   EXPECT_EQ(job->maps_folder, Example("textures"));
 }
 
+TEST(ParseJob, ReadsTheMinimalBrdfWithTheRecipesModel) {
+  auto job = ReadJobFile(Example("job_brdf_minimal.json"));
+  ASSERT_TRUE(job) << job.error().message;
+  EXPECT_EQ(job->kind, JobKind::kBrdf);
+  EXPECT_EQ(job->file, Example("chrome.binary"));
+  EXPECT_EQ(job->out, Example("baked"));
+  const brdf::ModelShape defaults;
+  const brdf::ModelShape shape = ModelOfJob(*job);
+  EXPECT_EQ(shape.grid.nside, defaults.grid.nside);
+  EXPECT_EQ(shape.hidden, defaults.hidden);
+  EXPECT_TRUE(shape.grid.angle_inputs);
+  EXPECT_TRUE(shape.grid.canonical_order);
+  job->recipe = Recipe::kPaper;
+  const brdf::ModelShape plain = ModelOfJob(*job);
+  EXPECT_EQ(plain.grid.nside, 64);
+  EXPECT_EQ(plain.hidden, 64);
+  EXPECT_FALSE(plain.grid.angle_inputs);
+  EXPECT_FALSE(plain.grid.canonical_order);
+}
+
+TEST(ParseJob, ReadsEveryFieldOfTheFullBrdf) {
+  auto job = ReadJobFile(Example("job_brdf_full.json"));
+  ASSERT_TRUE(job) << job.error().message;
+  const brdf::ModelShape shape = ModelOfJob(*job);
+  EXPECT_EQ(shape.grid.nside, 48);
+  EXPECT_EQ(shape.primitive_size, 24);
+  EXPECT_EQ(shape.index_bits, 10);
+  EXPECT_EQ(shape.hidden, 64);
+  EXPECT_EQ(shape.hidden_layers, 3);
+  EXPECT_EQ(shape.grid.interpolation, Interpolation::kInverseDistance);
+  EXPECT_FALSE(shape.grid.angle_inputs);
+  EXPECT_FALSE(shape.grid.canonical_order);
+  EXPECT_EQ(job->quality, Quality::kReference);
+  EXPECT_EQ(job->seed, 7u);
+  EXPECT_EQ(job->threads, 2);
+}
+
+TEST(ParseJob, RefusesFieldsOfAnotherKind) {
+  auto brdf = ReadJobFile(Example("job_brdf_invalid_many_problems.json"));
+  ASSERT_FALSE(brdf);
+  for (const char* pointer :
+       {"/file: is missing", "/folder: is a field of jobs of kind \"material\"", "/profile: is a",
+        "/min_psnr_db: is a", "/model/nside: ", "/model/index_bits: ", "/model/interpolation: ",
+        "/model/angle_inputs: ", "/model/depth: is not a field"}) {
+    EXPECT_THAT(brdf.error().message, HasSubstr(pointer));
+  }
+  EXPECT_THAT(brdf.error().message, HasSubstr("9 problems"));
+  auto material = ReadJobFile(Example("job_invalid_field_of_another_kind.json"));
+  ASSERT_FALSE(material);
+  EXPECT_THAT(material.error().message, HasSubstr("/file: is a field of jobs of kind \"brdf\""));
+}
+
 TEST(ParseJob, SurvivesItsOwnWriting) {
-  auto job = ReadJobFile(Example("job_full.json"));
-  ASSERT_TRUE(job);
-  auto again = ParseJob(JobToJson(*job), "", "again");
-  ASSERT_TRUE(again) << again.error().message;
-  EXPECT_EQ(JobToJson(*again), JobToJson(*job));
-  EXPECT_EQ(CanonicalJob(*again), CanonicalJob(*job));
+  for (const char* example : {"job_full.json", "job_brdf_full.json", "job_brdf_minimal.json"}) {
+    auto job = ReadJobFile(Example(example));
+    ASSERT_TRUE(job);
+    auto again = ParseJob(JobToJson(*job), "", "again");
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(JobToJson(*again), JobToJson(*job));
+    EXPECT_EQ(CanonicalJob(*again), CanonicalJob(*job));
+  }
 }
 
 TEST(ParseJob, ListsAllProblemsAtOnceWithTheirPointers) {
@@ -244,6 +303,7 @@ TEST(JobSchema, AgreesWithTheParser) {
       Json("auto"),
       Json("wrap"),
       Json("material"),
+      Json("brdf"),
       Json("a b"),
       Json("-a"),
       Json("bcf-1k"),
@@ -290,6 +350,27 @@ TEST(JobSchema, AgreesWithTheParser) {
     json.erase(key);
     documents.push_back(json);
   }
+  for (const char* key : {"kind", "file", "model", "folder", "maps", "samples", "quality", "seed",
+                          "toksvig", "unknown"}) {
+    for (const Json& value : values) {
+      Json json = MinimalBrdf();
+      json[key] = value;
+      documents.push_back(json);
+    }
+    Json json = MinimalBrdf();
+    json.erase(key);
+    documents.push_back(json);
+  }
+  for (const char* key : {"nside", "primitive_size", "index_bits", "hidden", "hidden_layers",
+                          "interpolation", "angle_inputs", "canonical_order", "unknown"}) {
+    for (const Json& value : {Json(0), Json(1), Json(1.5), Json(4), Json(5), Json(12), Json(13),
+                              Json(64), Json(65), Json(256), Json(257), Json(-1), Json(true),
+                              Json("bilinear"), Json("cubic"), Json(nullptr)}) {
+      Json json = MinimalBrdf();
+      json["model"][key] = value;
+      documents.push_back(json);
+    }
+  }
   int accepted = 0;
   for (const Json& document : documents) {
     const bool by_parser = ParseJob(document.dump(), "", "job.json").has_value();
@@ -322,6 +403,28 @@ TEST(CanonicalJob, LeavesOutWhatDoesNotChangeTheBytes) {
         +[](Job* j) {
           j->maps.push_back({"ao", "f.png", "r", "auto", "auto", false});
         }}) {
+    Job changed = a;
+    change(&changed);
+    EXPECT_NE(CanonicalJob(a), CanonicalJob(changed));
+  }
+}
+
+TEST(CanonicalJob, NamesTheModelOfABrdf) {
+  Job a;
+  a.kind = JobKind::kBrdf;
+  a.asset = "chrome";
+  a.file = "/here/chrome.binary";
+  Job b = a;
+  b.file = "elsewhere.binary";
+  b.out = "other";
+  b.threads = 3;
+  b.model.nside = ModelOfJob(a).grid.nside;  // what it would be anyway
+  EXPECT_EQ(CanonicalJob(a), CanonicalJob(b));
+  for (auto change :
+       {+[](Job* j) { j->seed = 2; }, +[](Job* j) { j->quality = Quality::kPreview; },
+        +[](Job* j) { j->recipe = Recipe::kPaper; }, +[](Job* j) { j->asset = "steel"; },
+        +[](Job* j) { j->model.nside = 7; }, +[](Job* j) { j->model.interpolation = "uniform"; },
+        +[](Job* j) { j->model.canonical_order = false; }}) {
     Job changed = a;
     change(&changed);
     EXPECT_NE(CanonicalJob(a), CanonicalJob(changed));

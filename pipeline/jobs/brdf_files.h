@@ -1,0 +1,26 @@
+// Which files hold measured BRDFs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+
+namespace patina {
+
+// Whether a .json file is a list of measurements rather than a job: an object with an array
+// "samples" and neither "kind" nor "version". Also true of a damaged list that looks like one as
+// far as it goes; false for a file that cannot be read.
+bool IsMeasurementList(const std::string& path);
+
+// Whether a file is a BRDF, by its name and, where other programs use the extension too (.bin,
+// .csv, .json), by a look into it.
+bool LooksLikeBrdfFile(const std::string& path);
+
+// The name of a BRDF's asset: the file's name without extension.
+std::string BrdfAssetName(const std::string& path);
+
+// The BRDF files directly in a folder, sorted; hidden ones are passed over. Errors: kIo.
+Result<std::vector<std::string>> FindBrdfFiles(const std::string& folder);
+
+}  // namespace patina

@@ -1,0 +1,69 @@
+#include "pipeline/jobs/brdf_job.h"
+
+namespace patina {
+namespace {
+
+template <class T>
+void Override(const std::optional<T>& given, T* value) {
+  if (given) *value = *given;
+}
+
+constexpr Interpolation kInterpolations[] = {
+    Interpolation::kBilinear, Interpolation::kInverseDistance, Interpolation::kUniform};
+
+}  // namespace
+
+const char* InterpolationName(Interpolation interpolation) {
+  switch (interpolation) {
+    case Interpolation::kInverseDistance:
+      return "inverse_distance";
+    case Interpolation::kUniform:
+      return "uniform";
+    case Interpolation::kBilinear:
+      break;
+  }
+  return "bilinear";
+}
+
+brdf::ModelShape ModelOfJob(const Job& job) {
+  brdf::ModelShape shape;
+  if (job.recipe == Recipe::kPaper) {
+    shape.grid.nside = 64;
+    shape.hidden = 64;
+    shape.grid.angle_inputs = false;
+    shape.grid.canonical_order = false;
+  }
+  const JobModel& model = job.model;
+  Override(model.nside, &shape.grid.nside);
+  Override(model.primitive_size, &shape.primitive_size);
+  Override(model.index_bits, &shape.index_bits);
+  Override(model.hidden, &shape.hidden);
+  Override(model.hidden_layers, &shape.hidden_layers);
+  Override(model.angle_inputs, &shape.grid.angle_inputs);
+  Override(model.canonical_order, &shape.grid.canonical_order);
+  for (const Interpolation interpolation : kInterpolations) {
+    if (model.interpolation == InterpolationName(interpolation))
+      shape.grid.interpolation = interpolation;
+  }
+  return shape;
+}
+
+brdf::TrainOptions TrainingOfJob(const Job& job) {
+  brdf::TrainOptions options;
+  options.seed = job.seed;
+  switch (job.quality) {
+    case Quality::kPreview:
+      options.free_steps = 3000;
+      options.codebook_steps = 1500;
+      break;
+    case Quality::kStandard:
+      break;
+    case Quality::kReference:
+      options.free_steps *= 3;
+      options.codebook_steps *= 3;
+      break;
+  }
+  return options;
+}
+
+}  // namespace patina

@@ -1,0 +1,32 @@
+// What the trainer is asked for by a job of kind "brdf".
+#pragma once
+
+#include <cstdint>
+
+#include "pipeline/brdf/train_brdf.h"
+#include "pipeline/jobs/job.h"
+
+namespace patina {
+
+// Raised whenever the same BRDF file, job and seed would give other bytes. Part of the fingerprint.
+inline constexpr int kBrdfRecipeVersion = 1;
+
+// Limits of Job::model; the least is 1 where none is named.
+inline constexpr int kMaxJobNside = 256;
+inline constexpr int kMaxJobPrimitiveSize = 64;
+inline constexpr int kMaxJobIndexBits = 12;
+inline constexpr int kMinJobHidden = 4;
+inline constexpr int kMaxJobHidden = 256;
+inline constexpr int kMaxJobHiddenLayers = 4;
+
+const char* InterpolationName(Interpolation interpolation);  // as in job files and manifests
+
+// The model's shape: the recipe's, with what the job says in its place. Recipe::kPaper is the plain
+// model: Nside 64, 64 hidden units, neither angle inputs nor canonical order. Whether the material
+// is isotropic is the source's to say.
+brdf::ModelShape ModelOfJob(const Job& job);
+
+// Steps by quality: fewer for preview, three times those of standard for reference.
+brdf::TrainOptions TrainingOfJob(const Job& job);
+
+}  // namespace patina

@@ -1,0 +1,50 @@
+// From a trained BRDF to the payloads and the manifest of a container.
+#pragma once
+
+#include <string>
+
+#include "formats/base/result.h"
+#include "formats/brdf/brdf_source.h"
+#include "formats/container.h"
+#include "formats/manifest.h"
+#include "pipeline/brdf/train_brdf.h"
+#include "pipeline/jobs/job.h"
+#include "pipeline/jobs/measure_brdf.h"
+
+namespace patina {
+
+// A BRDF file in memory, and the fingerprint of what is made from it.
+struct BrdfSource {
+  brdf::Source data;  // its warnings name no folder
+  std::string sha256;
+  std::string fingerprint;  // see BrdfFingerprint
+};
+
+// Errors: those of OpenBrdf; kConflict when the file changed while it was read.
+Result<BrdfSource> ReadBrdfSource(const Job& job);
+
+// SHA-256 of what decides the bytes of the container: recipe version, canonical job and the file's
+// hash.
+std::string BrdfFingerprint(const Job& job, const std::string& sha256);
+
+// Adds grid.hpx and decoder.weights. Errors: those of StagingArea::AddPayload; kInternal in place
+// of kInvalidArgument, since what was trained must be writable.
+Status AddBrdfModel(const brdf::TrainedBrdf& model, StagingArea* staging);
+
+// Fits sampler.bin to what the staged files decode to, adds it and names it in the manifest, which
+// must stand beside the payloads already. Errors: those of the decoder, EncodeBrdfSampler and
+// AddPayload.
+Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model);
+
+// The manifest of a container, without its quality.
+Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape);
+
+void DescribeBrdfQuality(const BrdfMeasurement& measurement, ManifestBrdf* model);
+
+// The text of report.json, deterministic: no times, no paths of the machine. manifest: with its
+// quality; payloads: the model's.
+std::string BrdfReportToJson(const Manifest& manifest, const std::vector<ManifestPayload>& payloads,
+                             const BrdfSource& source, const BrdfMeasurement& measurement,
+                             const brdf::TrainedBrdf& model);
+
+}  // namespace patina

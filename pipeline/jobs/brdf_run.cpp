@@ -1,0 +1,156 @@
+#include "pipeline/jobs/brdf_run.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+
+#include "formats/base/file_io.h"
+#include "pipeline/jobs/brdf_job.h"
+#include "pipeline/jobs/brdf_package.h"
+#include "pipeline/jobs/measure_brdf.h"
+#include "pipeline/jobs/package.h"
+#include "pipeline/jobs/staged_run.h"
+
+namespace patina {
+namespace {
+
+template <class... Args>
+std::string Format(const char* format, Args... args) {
+  char text[192];
+  const int n = std::snprintf(text, sizeof text, format, args...);
+  return n > 0 ? std::string(text, std::min(static_cast<size_t>(n), sizeof text - 1))
+               : std::string();
+}
+
+class BrdfRun : public StagedRun {
+ public:
+  using StagedRun::StagedRun;
+
+ private:
+  Status RunStages() override {
+    PATINA_TRY(Stage("ingest", [this] { return Ingest(); }));
+    PATINA_TRY(Stage("train", [this] { return Train(); }));
+    PATINA_TRY(Stage("package", [this] { return Package(); }));
+    PATINA_TRY(Stage("verify", [this] { return Verify(); }));
+    PATINA_TRY(Stage("report", [this] { return Report(); }));
+    return Stage("publish", [this] { return StagedRun::Publish(Curve()); });
+  }
+
+  Status Ingest() {
+    PATINA_TRY(ChooseSimdTarget());
+    reading_input_ = true;
+    PATINA_ASSIGN(source_, ReadBrdfSource(job_));
+    reading_input_ = false;
+    result_.fingerprint = source_.fingerprint;
+    const brdf::Source& data = source_.data;
+    for (const std::string& warning : data.warnings) sink_.OnWarning(warning);
+    observer_.OnNote("found",
+                     std::filesystem::path(job_.file).filename().string() + ": " + data.format +
+                         (data.isotropic ? ", isotropic, " : ", anisotropic, ") +
+                         Format("%llu of %llu colours valid",
+                                static_cast<unsigned long long>(data.cells - data.invalid_cells),
+                                static_cast<unsigned long long>(data.cells)));
+    return OpenStaging();
+  }
+
+  Status Train() {
+    brdf::ModelShape shape = ModelOfJob(job_);
+    shape.grid.isotropic = source_.data.isotropic;
+    brdf::TrainOptions options = TrainingOfJob(job_);
+    options.cancel = &cancel_;
+    auto trained = brdf::TrainBrdf(source_.data, shape, options, *pool_, sink_);
+    if (!trained) {
+      // The trainer finds out whether there is enough to learn from.
+      reading_input_ = trained.error().code == ErrorCode::kCorruptData;
+      return Fail(trained.error(), job_.file);
+    }
+    model_ = std::move(*trained);
+    result_.samples = model_.samples;
+    result_.stopped_by = "budget";
+    if (model_.rollbacks > 0) {
+      sink_.OnWarning("the training ran into values that are not finite and left out " +
+                      std::to_string(model_.rollbacks) + " steps; look at the preview");
+    }
+    return {};
+  }
+
+  Status Package() {
+    PATINA_TRY(AddBrdfModel(model_, &*staging_));
+    manifest_ = DescribeBrdf(job_, source_, model_.shape);
+    // So that the decoder can open what was written.
+    PATINA_TRY(staging_->WriteManifest(manifest_));
+    PATINA_TRY(AddBrdfSampler(&*staging_, &*manifest_.brdf));
+    result_.bytes = ModelBytes(staging_->payloads());
+    return staging_->WriteManifest(manifest_);
+  }
+
+  Status Verify() {
+    PATINA_TRY(VerifyPayloads({staging_->directory(), WithPayloads()}));
+    PATINA_ASSIGN(measurement_, MeasureBrdf(staging_->directory(), *manifest_.brdf, source_.data,
+                                            *pool_, cancel_, sink_));
+    DescribeBrdfQuality(measurement_, &*manifest_.brdf);
+    result_.brdf = SummarizeBrdf(measurement_);
+    WarnOfGain();
+    return {};
+  }
+
+  // A gain of energy, which measurements do show, is reported and not changed.
+  void WarnOfGain() {
+    constexpr double kTolerance = 1.005;  // of the quadrature
+    for (size_t i = 0; i < kAlbedoDegrees.size(); ++i) {
+      const double albedo =
+          *std::max_element(measurement_.albedo[i].begin(), measurement_.albedo[i].end());
+      if (albedo <= kTolerance) continue;
+      const std::string warning =
+          Format("more light is reflected than comes in: %.3f times as much at %.0f degrees",
+                 albedo, kAlbedoDegrees[i]);
+      manifest_.warnings.push_back(warning);
+      sink_.OnWarning(warning);
+      return;
+    }
+  }
+
+  Status Report() {
+    const std::string report =
+        BrdfReportToJson(manifest_, staging_->payloads(), source_, measurement_, model_);
+    PATINA_TRY(AddPreview(Sheet()));
+    PATINA_TRY(staging_->AddPayload("report.json", "report", AsBytes(report)));
+    return staging_->WriteManifest(manifest_);
+  }
+
+  RgbImage Sheet() const {
+    SheetRow row;
+    if (measurement_.image) {
+      row.label = Format("MAE %.5f  RMSE %.5f  SSIM %.5f", measurement_.image->mae_srgb,
+                         measurement_.image->rmse_srgb, measurement_.image->ssim);
+      row.pictures = {&measurement_.source_picture, &measurement_.decoded_picture,
+                      &measurement_.difference_picture};
+      const std::string heads[] = {"source", "decoded", "difference x8"};
+      return ComposeSheet(job_.asset, heads, std::span(&row, 1));
+    }
+    row.label = Format("log1p MAE %.5f at %llu measurements", measurement_.all.mae,
+                       static_cast<unsigned long long>(measurement_.all.pairs));
+    row.pictures = {&measurement_.decoded_picture};
+    const std::string heads[] = {"decoded", "", ""};  // columns that leave room for the text
+    return ComposeSheet(job_.asset, heads, std::span(&row, 1));
+  }
+
+  std::vector<RunCurvePoint> Curve() const {
+    std::vector<RunCurvePoint> curve;
+    for (const brdf::CurvePoint& point : model_.curve)
+      curve.push_back({point.samples, point.wall_s, {{"log1p_mae", point.log1p_mae}}});
+    return curve;
+  }
+
+  BrdfSource source_;
+  brdf::TrainedBrdf model_;
+  BrdfMeasurement measurement_;
+};
+
+}  // namespace
+
+JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel) {
+  return BrdfRun(job, observer, cancel).Run();
+}
+
+}  // namespace patina

@@ -1,0 +1,149 @@
+#include "pipeline/jobs/staged_run.h"
+
+#include <filesystem>
+#include <new>
+
+#include "formats/base/file_io.h"
+#include "pipeline/image/image_io.h"
+#include "pipeline/jobs/machine.h"
+
+namespace patina {
+namespace {
+
+double Since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+constexpr const char* kInterrupted = "interrupted before it was done; nothing was published";
+
+}  // namespace
+
+void StageSink::OnProgress(const ProgressEvent& event) {
+  ProgressEvent named = event;
+  // A module may name a step of its own within the stage, as the trainer does when it compresses.
+  if (event.message.empty() && event.stage != stage_) named.message = event.stage;
+  named.stage = stage_;
+  observer_.OnProgress(named);
+}
+
+void StageSink::OnWarning(const std::string& message) {
+  warnings_->push_back(message);
+  observer_.OnWarning(message);
+}
+
+StagedRun::StagedRun(const Job& job, JobObserver& observer, const CancelToken& cancel)
+    : job_(job),
+      observer_(observer),
+      cancel_(cancel),
+      sink_(observer, &result_.warnings),
+      start_(Clock::now()),
+      start_cpu_(ProcessCpuSeconds()) {}
+
+JobResult StagedRun::Run() {
+  ResetPeakMemory();
+  result_.asset = job_.asset;
+  result_.quality = QualityName(job_.quality);
+  result_.recipe = RecipeName(job_.recipe);
+  result_.seed = job_.seed;
+  Status status;
+  try {
+    status = RunStages();
+  } catch (const std::bad_alloc&) {
+    status = Fail(ErrorCode::kResourceExhausted,
+                  "not enough memory; use a smaller source, close other programs, or bake on a "
+                  "machine with more");
+  }
+  staging_.reset();
+  if (!status) {
+    result_.error = status.error();
+    result_.error_stage = stage_;
+    if (result_.exit_code == kExitDone)
+      result_.exit_code = ExitCodeFor(status.error(), reading_input_);
+  }
+  result_.seconds = SecondsSoFar();
+  result_.cpu_seconds = ProcessCpuSeconds() - start_cpu_;
+  return std::move(result_);
+}
+
+Status StagedRun::Stage(const char* name, const std::function<Status()>& body) {
+  if (cancel_.cancelled()) return Fail(ErrorCode::kCancelled, kInterrupted);
+  stage_ = name;
+  sink_.SetStage(name);
+  observer_.OnStageStarted(name);
+  const Clock::time_point start = Clock::now();
+  const double start_cpu = ProcessCpuSeconds();
+  Status status = body();
+  if (!status) {
+    if (status.error().code == ErrorCode::kCancelled) status.error().message = kInterrupted;
+    return status;
+  }
+  stages_.push_back({name, Since(start), ProcessCpuSeconds() - start_cpu});
+  observer_.OnStageFinished(name, stages_.back().seconds);
+  return status;
+}
+
+Status StagedRun::ChooseSimdTarget() {
+  PATINA_ASSIGN(simd_, ActiveSimdTarget());
+  return {};
+}
+
+Status StagedRun::OpenStaging() {
+  PATINA_ASSIGN(StagingArea staging, StagingArea::Create(job_.out, job_.asset));
+  staging_.emplace(std::move(staging));
+  pool_.emplace(job_.threads);
+  SetImageIoThreads(pool_->threads());
+  return {};
+}
+
+Status StagedRun::AddPreview(const RgbImage& sheet) {
+  // Images are written to files only; the payload is its bytes.
+  const std::string path = staging_->directory() + "/preview.tmp.png";
+  PATINA_TRY(WriteImage(path, WriteFormat::kPng8, sheet.width, sheet.height, 3, sheet.rgb.data()));
+  auto bytes = ReadFile(path, uint64_t{1} << 30);
+  std::error_code ignored;
+  std::filesystem::remove(path, ignored);
+  if (!bytes) return Fail(bytes.error());
+  return staging_->AddPayload("preview.png", "preview", *bytes);
+}
+
+Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {
+  RunRecord record;
+  record.asset = job_.asset;
+  record.fingerprint = result_.fingerprint;
+  record.version = PATINA_VERSION;
+  record.cpu = CpuName();
+  record.cpus = UsableCpus();
+  record.threads = pool_->threads();
+  record.simd = SimdTargetName(simd_);
+  record.seconds = SecondsSoFar();
+  record.cpu_seconds = ProcessCpuSeconds() - start_cpu_;
+  record.peak_memory_bytes = PeakMemoryBytes();
+  record.samples = result_.samples;
+  for (const StageCost& stage : stages_) {
+    if (stage.stage == "train" && stage.seconds > 0)
+      record.samples_per_s = result_.samples / stage.seconds;
+  }
+  record.stages = stages_;
+  record.curve = std::move(curve);
+  const std::string text = RunRecordToJson(record);
+  return staging_->AddUnlisted("run.json", AsBytes(text));
+}
+
+Status StagedRun::Publish(std::vector<RunCurvePoint> curve) {
+  PATINA_TRY(AddRunRecord(std::move(curve)));
+  PATINA_ASSIGN(PublishedContainer published, staging_->Publish());
+  result_.container = published.directory;
+  result_.revision = published.revision;
+  if (!published.warning.empty()) sink_.OnWarning(published.warning);
+  return {};
+}
+
+Manifest StagedRun::WithPayloads() const {
+  Manifest manifest = manifest_;
+  manifest.payloads = staging_->payloads();
+  return manifest;
+}
+
+double StagedRun::SecondsSoFar() const { return Since(start_); }
+
+}  // namespace patina

@@ -1,0 +1,91 @@
+// What jobs of every kind have in common: stages with a clock, a name in every report, cancelling,
+// errors and their exit codes, the record of the run, publishing.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/container.h"
+#include "pipeline/base/progress.h"
+#include "pipeline/base/thread_pool.h"
+#include "pipeline/jobs/event_log.h"
+#include "pipeline/jobs/job.h"
+#include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/run_record.h"
+#include "pipeline/jobs/sheet.h"
+#include "pipeline/kernels/dispatch.h"
+
+namespace patina {
+
+// Names the stage in every report, and remembers the warnings.
+class StageSink : public ProgressSink {
+ public:
+  // Both must outlive it.
+  StageSink(JobObserver& observer, std::vector<std::string>* warnings)
+      : observer_(observer), warnings_(warnings) {}
+
+  void SetStage(const std::string& stage) { stage_ = stage; }
+  void OnProgress(const ProgressEvent& event) override;
+  void OnWarning(const std::string& message) override;
+
+ private:
+  JobObserver& observer_;
+  std::vector<std::string>* warnings_;
+  std::string stage_;
+};
+
+// One run of a job. A kind of job derives from it; each of its stages returns an error or leaves
+// its result in a member.
+class StagedRun {
+ public:
+  // All three must outlive it.
+  StagedRun(const Job& job, JobObserver& observer, const CancelToken& cancel);
+  virtual ~StagedRun() = default;
+  StagedRun(const StagedRun&) = delete;
+  StagedRun& operator=(const StagedRun&) = delete;
+
+  // Call once. Does not tell the observer of the result.
+  JobResult Run();
+
+ protected:
+  // Calls Stage for each stage in order.
+  virtual Status RunStages() = 0;
+  Status Stage(const char* name, const std::function<Status()>& body);
+
+  // What can fail for reasons of the machine, and comes before minutes of work. OpenStaging makes
+  // the staging area and the threads.
+  Status ChooseSimdTarget();
+  Status OpenStaging();
+  // Writes a picture as the payload preview.png.
+  Status AddPreview(const RgbImage& sheet);
+  Status AddRunRecord(std::vector<RunCurvePoint> curve);
+  // AddRunRecord and the container's publication.
+  Status Publish(std::vector<RunCurvePoint> curve);
+  // The manifest with what is staged so far.
+  Manifest WithPayloads() const;
+  double SecondsSoFar() const;
+
+  const Job& job_;
+  JobObserver& observer_;
+  const CancelToken& cancel_;
+  JobResult result_;
+  StageSink sink_;
+  bool reading_input_ = false;  // an error now is the input's fault
+  std::optional<StagingArea> staging_;
+  std::optional<ThreadPool> pool_;
+  Manifest manifest_;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  Clock::time_point start_;
+  double start_cpu_;
+  std::string stage_;
+  std::vector<StageCost> stages_;
+  SimdTarget simd_ = SimdTarget::kAvx2;
+};
+
+}  // namespace patina
