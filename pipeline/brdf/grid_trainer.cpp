@@ -50,6 +50,11 @@ GridTrainer::GridTrainer(const NetworkLayout& layout, int corners, const BrdfKer
     const float bound = std::sqrt(6.0f / static_cast<float>(layer.inputs)) * (last ? 0.3f : 1.0f);
     const int used = last ? kOutputs : layout.hidden;
     for (int i = 0; i < layer.inputs; ++i) {
+      // Rows of padding stay zero, or features that are never written would learn something.
+      const int side = i / layout.feature_stride;
+      const bool padding = l == 0 ? side < 2 && i % layout.feature_stride >= layout.primitive_size
+                                  : i >= layout.hidden;
+      if (padding) continue;
       for (int n = 0; n < used; ++n)
         parameters_[layer.weights + static_cast<size_t>(i) * layer.outputs + n] =
             UniformIn(&rng, bound);

@@ -79,6 +79,17 @@ TEST(TrainBrdf, LearnsAGlossyMaterial) {
   EXPECT_LT(trained.final_loss, 1.5 * trained.free_loss) << "the codebook must cost little";
 }
 
+// Features and hidden units are padded to whole vectors in training and not in the container.
+TEST(TrainBrdf, SizesThatFillNoVectorAreWrittenAsTheyWereTrained) {
+  const Source source = PlasticSource(0.2f);
+  ModelShape shape = Small();
+  shape.primitive_size = 5;
+  shape.hidden = 20;
+  const ImageError error = SphereError(source, MustTrain(source, shape, Quick(), 2));
+  EXPECT_LT(error.mae_srgb, 0.012);
+  EXPECT_GT(error.ssim, 0.99);
+}
+
 TEST(TrainBrdf, IsTheSameForAnyNumberOfThreads) {
   const Source source = PlasticSource(0.3f);
   TrainOptions options = Quick();
