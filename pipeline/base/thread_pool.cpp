@@ -56,7 +56,8 @@ void ThreadPool::Run(int count, Call call, void* context) {
     wake_.notify_all();
     Drain(0);
     for (int spins = 0; busy_.load(std::memory_order_acquire) != 0; ++spins) {
-      if (spins < 100 * kSpins) _mm_pause(); else std::this_thread::yield();
+      // A worker that another program pushed off its core gets this one.
+      if (spins < kSpins) _mm_pause(); else std::this_thread::yield();
     }
   } else {
     Drain(0);

@@ -83,7 +83,8 @@ struct ChunkResult {
   explicit ChunkResult(const NetworkLayout& layout);
   AlignedBuffer<float> weight_gradient;   // like the parameters
   AlignedBuffer<float> feature_gradient;  // [kChunkRows][2 * feature_stride]
-  double loss = 0;
+  double loss = 0;                        // not finite if an output was not
+  bool finite = true;                     // the squares of both gradients are
 };
 
 struct ChunkTask {

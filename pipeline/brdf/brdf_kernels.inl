@@ -106,8 +106,9 @@ PATINA_STAGE double LossRows(const ChunkTask& task, float* outputs) {
       }
       F16 derivative;
       const F16 loss = LossOf(Load(y), Load(target), Load(cosine), &derivative) * Load(importance);
+      // The cap on y would hide an output that is not finite; 0 * y does not.
+      total += static_cast<double>(ReduceSum(MulAdd(Load(y), Zero(), loss)));
       Store(y, derivative * Load(importance));
-      total += static_cast<double>(ReduceSum(loss));
       for (int l = 0; l < 16; ++l) outputs[(s + l) * 16 + c] = y[l];
     }
     for (int l = 0; l < 16; ++l) {
@@ -124,6 +125,16 @@ PATINA_STAGE void MaskRows(const float* activation, int stride, float* gradient,
     for (int n = 0; n < columns; n += 16)
       Store(g + n, ZeroUnless(Load(a + n) > Zero(), Load(g + n)));
   }
+}
+
+// A sum of zeros, unless a square, which Adam keeps, is not finite.
+PATINA_STAGE bool SquaresAreFinite(const float* values, size_t count) {
+  F16 sum = Zero();
+  for (size_t i = 0; i < count; i += 16) {
+    const F16 value = Load(values + i);
+    sum = MulAdd(value * value, Zero(), sum);
+  }
+  return ReduceSum(sum) == 0.0f;
 }
 
 void TrainChunk(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* result) {
@@ -145,6 +156,9 @@ void TrainChunk(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* resul
     if (l > 0) MaskRows(a, layer.input_stride, lower, columns);
     upper = lower;
   }
+  result->finite = SquaresAreFinite(result->weight_gradient.data(), layout.parameter_count) &&
+                   SquaresAreFinite(result->feature_gradient.data(),
+                                    static_cast<size_t>(kChunkRows) * 2 * layout.feature_stride);
 }
 
 void ForwardChunk(const ChunkTask& task, ChunkScratch* scratch) { ForwardRows(task, scratch); }

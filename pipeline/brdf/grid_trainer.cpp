@@ -93,11 +93,9 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
     kernels_.train_chunk(MakeTask(samples + first, std::min(kChunkRows, count - first)),
                          scratch_[worker].get(), results_[chunk].get());
   });
-  double loss = 0;
-  for (int chunk = 0; chunk < chunks; ++chunk) loss += results_[chunk]->loss;
-  if (!std::isfinite(loss)) return false;
-  loss_ += loss;
-  loss_samples_ += count;
+  for (int chunk = 0; chunk < chunks; ++chunk) {
+    if (!std::isfinite(results_[chunk]->loss) || !results_[chunk]->finite) return false;
+  }
   ++steps_;
   if (has_codebook()) ++code_steps_;
 
@@ -167,12 +165,6 @@ void GridTrainer::UseCodebook(std::vector<float> codebook, std::vector<int32_t> 
   code_touched_.assign(codebook.size() / layout_.feature_stride, 0);
   index_ = std::move(index);
   code_steps_ = 0;
-}
-
-double GridTrainer::TakeLoss() {
-  const double mean = loss_samples_ > 0 ? loss_ / loss_samples_ : 0;
-  loss_ = loss_samples_ = 0;
-  return mean;
 }
 
 void GridTrainer::Evaluate(const PoolSample* samples, size_t count, float* y) {

@@ -20,17 +20,17 @@ struct StepRates {
   float network = 0;
 };
 
-// Corners are numbered through all grids; rows of features have layout.feature_stride floats.
+// Corners are numbered through both grids; rows of features have layout.feature_stride floats.
 // Results do not depend on the number of threads. Not thread-safe.
 class GridTrainer {
  public:
-  // grids: number of rows of each grid; wi's of material 0, wo's of material 0, wi's of material 1,
-  // ... A sample's four corners of wi lie in an even grid, those of wo in the odd one after it.
+  // corners: rows of both grids together; a sample's corners of wi and of wo are never the same
+  // rows. Features and network start at random from the seed. All references must outlive it.
   GridTrainer(const NetworkLayout& layout, int corners, const BrdfKernels& kernels,
               ThreadPool& pool, uint64_t seed);
 
-  // One step on `count` samples, at most the batch given to Reserve. Returns false, changing
-  // nothing, if a value was not finite.
+  // One step on `count` samples. Returns false, changing nothing that is trained, if the loss or a
+  // gradient was not finite.
   bool Step(const PoolSample* samples, int count, const StepRates& rates);
 
   // Goes over to a codebook: `codes` rows and an index for each corner. From here on steps move the
@@ -38,13 +38,9 @@ class GridTrainer {
   void UseCodebook(std::vector<float> codebook, std::vector<int32_t> index);
   bool has_codebook() const { return !index_.empty(); }
 
-  // Mean loss since the last call.
-  double TakeLoss();
-
   // y of samples in order: [count][3].
   void Evaluate(const PoolSample* samples, size_t count, float* y);
 
-  const NetworkLayout& layout() const { return layout_; }
   int corners() const { return corners_; }
   AlignedBuffer<float>& features() { return features_; }
   AlignedBuffer<float>& codebook() { return codebook_; }
@@ -71,7 +67,6 @@ class GridTrainer {
   std::vector<uint8_t> touched_, code_touched_;
   std::vector<int32_t> rows_[2], code_rows_;
   int steps_ = 0, code_steps_ = 0;
-  double loss_ = 0, loss_samples_ = 0;
 };
 
 }  // namespace patina::brdf

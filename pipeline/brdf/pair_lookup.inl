@@ -184,7 +184,9 @@ PATINA_STAGE void OutputValues(const float* outputs, const brdf::Direction* wi,
       const int at = first + (l < used ? l : 0);
       lanes[l] = outputs[at / 3 * 16 + at % 3];
     }
-    Store(lanes, Max(Exp(Min(Load(lanes), Set(brdf::kMaxLogValue))) - Set(1.0f), Zero()));
+    // NaN, which only absurd weights can give, becomes 0, as in the decoder.
+    const F16 y = Min(Max(Load(lanes), Zero()), Set(brdf::kMaxLogValue));
+    Store(lanes, Exp(y) - Set(1.0f));
     for (int l = 0; l < used; ++l) {
       const int s = (first + l) / 3;
       rgb[first + l] = wi[s].z > 0 && wo[s].z > 0 ? lanes[l] : 0.0f;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "formats/brdf/angles.h"
 #include "pipeline/brdf/angle_inputs.h"
 
 namespace patina::brdf {
@@ -11,11 +12,6 @@ namespace {
 
 constexpr int kTries = 64;
 constexpr int kSamplesPerTask = 4096;
-
-Direction Spherical(float theta, float phi) {
-  const float s = std::sin(theta);
-  return {s * std::cos(phi), s * std::sin(phi), std::cos(theta)};
-}
 
 void FillValue(const float rgb[3], float weight, const Direction& wi, const Direction& wo,
                PoolSample* sample) {
@@ -56,15 +52,9 @@ void DrawPair(Draw draw, Rng* rng, Direction* wi, Direction* wo) {
     const float u = rng->Uniform();
     const float theta_h = u * u * kHalfPi, theta_d = rng->Uniform() * kHalfPi,
                 phi_d = turn * rng->Uniform(), phi_h = turn * rng->Uniform();
-    const Direction d = Spherical(theta_d, phi_d);
-    const float c = std::cos(theta_h), s = std::sin(theta_h), cp = std::cos(phi_h),
-                sp = std::sin(phi_h);
-    const auto turned = [&](const Direction& v) {
-      const float x = c * v.x + s * v.z, z = -s * v.x + c * v.z;
-      return Direction{cp * x - sp * v.y, sp * x + cp * v.y, z};
-    };
-    *wi = turned(d);
-    *wo = turned({-d.x, -d.y, d.z});
+    FromHalfDifference(theta_h, theta_d, phi_d, wi, wo);
+    const float c = std::cos(phi_h), s = std::sin(phi_h);
+    for (Direction* w : {wi, wo}) *w = {c * w->x - s * w->y, s * w->x + c * w->y, w->z};
     if (wi->z > 0 && wo->z > 0) return;
   }
 }

@@ -21,7 +21,8 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// A sixteenth of the indices stays free: rare codes bring least, and the default model stays below 25 KB.
+// A sixteenth of the indices stays free: rare codes bring least, and the default model stays below
+// 25 KB.
 int CodesOf(const ModelShape& shape) {
   const int indices = 1 << shape.index_bits;
   return indices - indices / 16;
@@ -72,7 +73,7 @@ class Session {
     held_out_ = std::min(kHeldOut, samples_.size() / 8);
     train_count_ = samples_.size() - held_out_;
     CountUsage();
-    const int total = options_.free_steps + (options_.use_codebook ? options_.codebook_steps : 0);
+    const int total = options_.free_steps + options_.codebook_steps;
     for (int step = 0; step < options_.free_steps; ++step) {
       if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
       const float factor = CosineRate(step, options_.free_steps);
@@ -81,16 +82,14 @@ class Session {
     }
     result_.free_loss = HeldOut();
     Record();
-    if (options_.use_codebook) {
-      StartCodebook();
-      for (int step = 0; step < options_.codebook_steps; ++step) {
-        if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
-        const float factor = CosineRate(step, options_.codebook_steps);
-        Step({options_.codebook_rate * factor, options_.codebook_network_rate * factor});
-        Report(options_.free_steps + step, total);
-      }
-      result_.used_codes = UsagePerplexity(trainer_.index(), usage_, Codes());
+    StartCodebook();
+    for (int step = 0; step < options_.codebook_steps; ++step) {
+      if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
+      const float factor = CosineRate(step, options_.codebook_steps);
+      Step({options_.codebook_rate * factor, options_.codebook_network_rate * factor});
+      Report(options_.free_steps + step, total);
     }
+    result_.used_codes = UsagePerplexity(trainer_.index(), usage_, Codes());
     result_.final_loss = HeldOut();
     Record();
     return Finish();
@@ -156,7 +155,7 @@ class Session {
 
   Result<TrainedBrdf> Finish() {
     result_.shape = shape_;
-    if (options_.use_codebook) MakePack();
+    MakePack();
     PATINA_TRY(MakeNetwork());
     return std::move(result_);
   }

@@ -191,9 +191,12 @@ std::string BrdfReportToJson(const Manifest& manifest, const std::vector<Manifes
   json["model"] = ModelJson(described);
   json["quality"] = QualityJson(measurement, source.data.table == nullptr);
   json["training"] = {
-      {"samples", model.samples},         {"codes", uint64_t{1} << described.index_bits},
-      {"codes_in_use", model.used_codes}, {"log1p_mae_before_codebook", model.free_loss},
-      {"log1p_mae", model.final_loss},    {"rollbacks", model.rollbacks}};
+      {"samples", model.samples},
+      {"codes", model.pack.codebook.size() / static_cast<size_t>(described.primitive_size)},
+      {"codes_in_use", model.used_codes},
+      {"log1p_mae_before_codebook", model.free_loss},
+      {"log1p_mae", model.final_loss},
+      {"rollbacks", model.rollbacks}};
   json["bytes"] = Json::object();
   for (const ManifestPayload& payload : payloads) json["bytes"][payload.name] = payload.bytes;
   json["warnings"] = manifest.warnings;

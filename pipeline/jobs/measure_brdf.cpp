@@ -12,6 +12,7 @@
 #include "pipeline/base/rng.h"
 #include "pipeline/brdf/sample_pool.h"
 #include "pipeline/color/color.h"
+#include "pipeline/jobs/load_brdf_decoder.h"
 
 namespace patina {
 namespace {
@@ -28,6 +29,7 @@ constexpr uint64_t kPairSeed = 20231;
 constexpr int kAlbedoThetas = 64;
 constexpr int kAlbedoPhis = 128;
 constexpr size_t kPairsPerTask = 1024;
+constexpr double kMaxDisagreement = 1e-3;
 
 struct Pairs {
   std::vector<Direction> wi, wo;
@@ -89,6 +91,22 @@ std::vector<float> EvaluateAll(Decoded* decoded, const std::vector<Direction>& w
   return rgb;
 }
 
+// The same with what a renderer uses.
+std::vector<float> DecodeAll(const BrdfDecoder& decoder, const std::vector<Direction>& wi,
+                             const std::vector<Direction>& wo, ThreadPool& pool) {
+  std::vector<float> rgb(3 * wi.size());
+  const auto tasks = static_cast<int>((wi.size() + kPairsPerTask - 1) / kPairsPerTask);
+  pool.ParallelFor(tasks, [&](int task, int) {
+    const size_t begin = static_cast<size_t>(task) * kPairsPerTask;
+    const size_t end = std::min(wi.size(), begin + kPairsPerTask);
+    for (size_t i = begin; i < end; ++i) {
+      const float in[3] = {wi[i].x, wi[i].y, wi[i].z}, out[3] = {wo[i].x, wo[i].y, wo[i].z};
+      decoder.Evaluate(in, out, rgb.data() + 3 * i);
+    }
+  });
+  return rgb;
+}
+
 // Compares f of `count` pairs with that of the source.
 Log1pError CompareValues(const float* source, const float* decoded, size_t count) {
   Log1pError error;
@@ -146,8 +164,11 @@ RgbImage DifferenceOf(const RgbImage& a, const RgbImage& b) {
 
 class Meter {
  public:
-  Meter(const brdf::Source& source, Decoded* decoded, ThreadPool& pool)
-      : source_(source), decoded_(*decoded), pool_(pool) {}
+  Meter(const brdf::Source& source, const BrdfDecoder& decoder, Decoded* decoded, ThreadPool& pool)
+      : source_(source), decoder_(decoder), decoded_(*decoded), pool_(pool) {}
+
+  // Mean difference of the decoder's and the kernels' log(1 + f) at the pairs of MeasurePairs.
+  double disagreement() const { return disagreement_; }
 
   void MeasurePairs(BrdfMeasurement* result) {
     Pairs pairs;
@@ -164,8 +185,10 @@ class Meter {
       first_kind = pairs.wi.size();
       Draw(brdf::Draw::kDirections, &pairs, &wanted);
     }
-    const std::vector<float> forth = EvaluateAll(&decoded_, pairs.wi, pairs.wo, pool_);
-    const std::vector<float> back = EvaluateAll(&decoded_, pairs.wo, pairs.wi, pool_);
+    const std::vector<float> forth = DecodeAll(decoder_, pairs.wi, pairs.wo, pool_);
+    const std::vector<float> back = DecodeAll(decoder_, pairs.wo, pairs.wi, pool_);
+    const std::vector<float> kernels = EvaluateAll(&decoded_, pairs.wi, pairs.wo, pool_);
+    disagreement_ = CompareValues(forth.data(), kernels.data(), pairs.wi.size()).mae;
     result->half_angles = CompareValues(wanted.data(), forth.data(), first_kind);
     result->directions = CompareValues(wanted.data() + 3 * first_kind,
                                        forth.data() + 3 * first_kind, pairs.wi.size() - first_kind);
@@ -210,8 +233,10 @@ class Meter {
   }
 
   const brdf::Source& source_;
+  const BrdfDecoder& decoder_;
   Decoded& decoded_;
   ThreadPool& pool_;
+  double disagreement_ = 0;
 };
 
 }  // namespace
@@ -268,7 +293,8 @@ Result<BrdfMeasurement> MeasureBrdf(const std::string& directory, const Manifest
                                     const CancelToken& cancel, ProgressSink& progress) {
   PATINA_ASSIGN(const brdf::BatchEvaluator evaluator, OpenBrdfContainer(directory, model));
   Decoded decoded(evaluator, pool.threads());
-  Meter meter(source, &decoded, pool);
+  PATINA_ASSIGN(const BrdfDecoder decoder, LoadBrdfDecoder(directory));
+  Meter meter(source, decoder, &decoded, pool);
   BrdfMeasurement result;
   const std::pair<double, void (Meter::*)(BrdfMeasurement*)> steps[] = {
       {0.1, &Meter::MeasurePairs}, {0.2, &Meter::MeasureAlbedo}, {1.0, &Meter::MeasureImages}};
@@ -277,6 +303,13 @@ Result<BrdfMeasurement> MeasureBrdf(const std::string& directory, const Manifest
     (meter.*step)(&result);
     if (!decoded.finite())
       return Fail(ErrorCode::kInternal, directory + ": decodes to a value that is not finite");
+    // Images are rendered with the kernels, so both must see the same material. They differ by
+    // roundings of angles only.
+    if (!(meter.disagreement() < kMaxDisagreement)) {
+      return Fail(ErrorCode::kInternal, directory + ": the decoder and the kernels differ by " +
+                                            std::to_string(meter.disagreement()) +
+                                            " in log(1 + f); please report this file");
+    }
     ProgressEvent event;
     event.stage = "verify";
     event.fraction = fraction;

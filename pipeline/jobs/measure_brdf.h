@@ -1,4 +1,5 @@
-// Measures a written BRDF against its source.
+// Measures a written BRDF against its source: pairs with the decoder that renderers use, pictures
+// and albedo with the SIMD kernels, which must agree with it.
 #pragma once
 
 #include <array>

@@ -206,6 +206,44 @@ TEST_P(BrdfKernelsTest, ExtremeValuesGiveFiniteGradients) {
   }
 }
 
+// The cap on y turns NaN and infinity into an ordinary value; they must show all the same.
+TEST_P(BrdfKernelsTest, ValuesThatAreNotFiniteShowInTheLoss) {
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+        -std::numeric_limits<float>::infinity()}) {
+    Case c(kShapes[0], 100, 11);
+    const DenseLayer& last = c.layout.layers.back();
+    c.parameters[last.weights + static_cast<size_t>(last.inputs) * last.outputs + 1] = bad;
+    TransposeWeights(c.layout, c.parameters.data(), c.transposed.data());
+    kernels().train_chunk(c.Task(), &c.scratch, &c.result);
+    EXPECT_FALSE(std::isfinite(c.result.loss)) << bad;
+  }
+  // Gradients whose squares overflow would stop Adam for good.
+  Case c(kShapes[0], 16, 12);
+  kernels().train_chunk(c.Task(), &c.scratch, &c.result);
+  EXPECT_TRUE(c.result.finite);
+  for (size_t s = 0; s < c.samples.size(); ++s) c.samples[s].importance = 3e38f;
+  kernels().train_chunk(c.Task(), &c.scratch, &c.result);
+  EXPECT_FALSE(c.result.finite);
+}
+
+TEST_P(BrdfKernelsTest, OutputsBecomeValuesThatAreFiniteAndNotNegative) {
+  const float inf = std::numeric_limits<float>::infinity();
+  const float y[] = {-inf, -5, -1e-30f, 0,   1e-6f,
+                     1,    12, 13,      inf, std::numeric_limits<float>::quiet_NaN()};
+  for (const float value : y) {
+    std::vector<float> rgb(3, -1);
+    AlignedBuffer<float> outputs(16 * kChunkRows);
+    for (int c = 0; c < kOutputs; ++c) outputs[c] = value;
+    const Direction up;
+    kernels().output_values(outputs.data(), &up, &up, 1, rgb.data());
+    const double wanted = value > 0 ? std::expm1(std::min(static_cast<double>(value), 12.0)) : 0;
+    // exp(y) - 1 in single precision: half an ulp of one, and two of the value.
+    for (const float v : rgb)
+      EXPECT_NEAR(static_cast<double>(v), wanted, 1.2e-7 + 3e-7 * wanted) << value;
+  }
+}
+
 TEST(BrdfKernels, GiveTheSameBitsOnBothTargets) {
   if (!SimdTargetSupported(SimdTarget::kAvx512)) GTEST_SKIP() << "this CPU has no avx512";
   for (const Shape& shape : kShapes) {
