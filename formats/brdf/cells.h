@@ -72,6 +72,27 @@ class CellReport {
     if (not_finite_++ == 0) first_not_finite_ = place();
   }
 
+  // The cell of these channels; invalid if one is negative, not finite or above
+  // kMaxValue. Noted only if it counts.
+  template <class Place>
+  Cell Check(const double rgb[3], bool counts, Place&& place) {
+    Cell cell;
+    bool negative = false;
+    bool finite = true;
+    for (int c = 0; c < 3; ++c) {
+      negative |= rgb[c] < 0;
+      finite &= std::abs(rgb[c]) <= static_cast<double>(kMaxValue);
+      cell.rgb[c] = finite ? static_cast<float>(rgb[c]) : 0;
+    }
+    if (finite && !negative) return cell;
+    if (counts && !finite) {
+      NotFinite(place);
+    } else if (counts) {
+      Negative(place);
+    }
+    return Cell::Invalid();
+  }
+
   uint64_t count() const { return negative_ + not_finite_; }
 
   // "12 negative cells left out, the first at ..."

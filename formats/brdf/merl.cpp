@@ -115,28 +115,13 @@ Result<Source> ParseMerl(std::span<const uint8_t> bytes, const std::string& name
   CellReport report;
   uint64_t valid = 0;
   for (int cell = 0; cell < kMerlCells; ++cell) {
-    bool negative = false;
-    bool finite = true;
+    double rgb[3];
     for (int c = 0; c < 3; ++c) {
       const size_t index = static_cast<size_t>(c) * kMerlCells + static_cast<size_t>(cell);
-      const double value =
-          LoadLittleDouble(bytes.data() + kMerlHeaderBytes + 8 * index) * kMerlScale[c];
-      negative |= value < 0;
-      finite &= std::abs(value) <= static_cast<double>(kMaxValue);
-      cells[cell].rgb[c] = finite ? static_cast<float>(value) : 0;
+      rgb[c] = LoadLittleDouble(bytes.data() + kMerlHeaderBytes + 8 * index) * kMerlScale[c];
     }
-    if (finite && !negative) {
-      ++valid;
-      continue;
-    }
-    cells[cell] = Cell::Invalid();
-    if (!above[cell]) continue;
-    const auto place = [&] { return CellText(cell); };
-    if (!finite) {
-      report.NotFinite(place);
-    } else {
-      report.Negative(place);
-    }
+    cells[cell] = report.Check(rgb, above[cell], [&] { return CellText(cell); });
+    valid += cells[cell].valid() ? 1 : 0;
   }
   if (valid == 0) {
     return corrupt("no valid cell: all " + std::to_string(kMerlCells) +

@@ -73,26 +73,15 @@ Result<Source> ParseUtia(std::span<const uint8_t> bytes, const std::string& name
   std::vector<Cell> cells(kUtiaCells);
   CellReport report;
   for (int cell = 0; cell < kUtiaCells; ++cell) {
-    bool negative = false;
-    bool finite = true;
+    double rgb[3];
     for (int c = 0; c < 3; ++c) {
       const size_t index = static_cast<size_t>(c) * kUtiaCells + static_cast<size_t>(cell);
-      const double value = LoadLittleDouble(bytes.data() + 8 * index);
-      negative |= value < 0;
-      finite &= std::abs(value) <= static_cast<double>(kMaxValue);
-      cells[cell].rgb[c] = finite ? static_cast<float>(value) : 0;
+      rgb[c] = LoadLittleDouble(bytes.data() + 8 * index);
     }
-    if (finite && !negative) continue;
-    cells[cell] = Cell::Invalid();
-    const auto place = [&] {
+    cells[cell] = report.Check(rgb, true, [&] {
       return "row " + std::to_string(cell / kUtiaSide) + ", column " +
              std::to_string(cell % kUtiaSide) + ", byte " + std::to_string(int64_t{8} * cell);
-    };
-    if (!finite) {
-      report.NotFinite(place);
-    } else {
-      report.Negative(place);
-    }
+    });
   }
   if (report.count() == kUtiaCells) {
     return corrupt("no valid cell: all " + std::to_string(kUtiaCells) +

@@ -7,6 +7,7 @@
 #include "formats/brdf/rgl.h"
 #include "formats/brdf/tensor_file.h"
 #include "tests/formats/brdf/brdf_samples.h"
+#include "tests/formats/brdf/tensors.h"
 
 namespace patina::brdf {
 namespace {
@@ -25,23 +26,7 @@ std::vector<uint8_t> SmallFile() {
   return EncodeRgl(MirroredBrdf, layout, "small");
 }
 
-std::vector<TensorToWrite> SmallTensors() {
-  const std::vector<uint8_t> bytes = SmallFile();
-  std::vector<TensorToWrite> tensors;
-  const auto file = ParseTensorFile(bytes, "own");
-  for (const Tensor& tensor : file->tensors)
-    tensors.push_back(
-        {tensor.name, tensor.type, tensor.shape, {tensor.bytes.begin(), tensor.bytes.end()}});
-  return tensors;
-}
-
-TensorToWrite& Named(std::vector<TensorToWrite>& tensors, const std::string& name) {
-  for (TensorToWrite& tensor : tensors) {
-    if (tensor.name == name) return tensor;
-  }
-  tensors.push_back({name, TensorType::kU8, {}, {}});
-  return tensors.back();
-}
+std::vector<TensorToWrite> SmallTensors() { return TensorsOf(SmallFile()); }
 
 void SetFloat(TensorToWrite& tensor, size_t index, float value) {
   std::memcpy(&tensor.data[4 * index], &value, 4);

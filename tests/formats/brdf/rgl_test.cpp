@@ -10,28 +10,12 @@
 #include "formats/brdf/spectrum.h"
 #include "formats/brdf/tensor_file.h"
 #include "tests/formats/brdf/brdf_samples.h"
+#include "tests/formats/brdf/tensors.h"
 
 namespace patina::brdf {
 namespace {
 
 using test::Random;
-
-std::vector<TensorToWrite> TensorsOf(std::span<const uint8_t> bytes) {
-  std::vector<TensorToWrite> tensors;
-  const auto file = ParseTensorFile(bytes, "own");
-  for (const Tensor& tensor : file->tensors)
-    tensors.push_back(
-        {tensor.name, tensor.type, tensor.shape, {tensor.bytes.begin(), tensor.bytes.end()}});
-  return tensors;
-}
-
-TensorToWrite& Named(std::vector<TensorToWrite>& tensors, const std::string& name) {
-  for (TensorToWrite& tensor : tensors) {
-    if (tensor.name == name) return tensor;
-  }
-  tensors.push_back({name, TensorType::kU8, {}, {}});
-  return tensors.back();
-}
 
 // Directional albedo by a fixed quadrature over the view directions (even in the solid angle).
 void Albedo(const Table& table, const Direction& wi, double albedo[3]) {
