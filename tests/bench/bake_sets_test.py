@@ -22,21 +22,28 @@ with open(os.environ["CALLS"], "a") as calls:
 if asset == "broken":
     print(json.dumps({"asset": asset, "status": "failed", "error": {"code": "corrupt_data", "message": "no maps"}}))
     sys.exit(3)
-container = os.path.join(option("--out"), asset)
-os.makedirs(container, exist_ok=True)
 paper = option("--recipe") == "paper"
 quality = (30.0 if paper else 33.0) + int(option("--seed"))
-with open(os.path.join(container, "report.json"), "w") as file:
-    json.dump({"width": 64, "height": 32, "channels": [{}, {}, {"constant": 1}],
-               "training": {"export": {"float_model_psnr_db": {"mip0": 31.5, "mean_mips": 35.0, "off_grid": 29.0},
-                                       "exported_psnr_db": {"mip0": 31.25, "mean_mips": 34.0, "off_grid": 28.5}}}}, file)
-with open(os.path.join(container, "run.json"), "w") as file:
-    json.dump({"samples_per_s": 2.5e7, "peak_memory_bytes": 1000}, file)
+
+def bake(asset):
+    container = os.path.join(option("--out"), asset)
+    os.makedirs(container, exist_ok=True)
+    with open(os.path.join(container, "report.json"), "w") as file:
+        json.dump({"width": 64, "height": 32, "channels": [{}, {}, {"constant": 1}],
+                   "training": {"export": {"float_model_psnr_db": {"mip0": 31.5, "mean_mips": 35.0, "off_grid": 29.0},
+                                           "exported_psnr_db": {"mip0": 31.25, "mean_mips": 34.0, "off_grid": 28.5}}}}, file)
+    with open(os.path.join(container, "run.json"), "w") as file:
+        json.dump({"samples_per_s": 2.5e7, "peak_memory_bytes": 1000}, file)
+    return {"asset": asset, "status": "done", "container": container, "bytes": 1770000, "seconds": 20.0,
+            "cpu_seconds": 39.0, "samples": int(option("--samples") or 4000), "stopped_by": "budget", "ssim": 0.9,
+            "flip": None, "normal_angle_deg": 3.5,
+            "psnr": {"overall": quality, "mip0": quality - 1, "mean_mips": quality + 2, "maps": {}}}
+
 print("progress that is not JSON")
-print(json.dumps({"asset": asset, "status": "done", "container": container, "bytes": 1770000, "seconds": 20.0,
-                  "cpu_seconds": 39.0, "samples": int(option("--samples") or 4000), "stopped_by": "budget", "ssim": 0.9,
-                  "flip": None, "normal_angle_deg": 3.5,
-                  "psnr": {"overall": quality, "mip0": quality - 1, "mean_mips": quality + 2, "maps": {}}}))
+if asset == "pair":
+    print(json.dumps({"version": 1, "exit_code": 0, "assets": [bake("pair_left"), bake("pair_right")]}))
+else:
+    print(json.dumps(bake(asset)))
 '''
 
 PEERS = r'''
@@ -105,6 +112,15 @@ class BakeSetsTest(unittest.TestCase):
         self.assertEqual({row["codec"] for row in rows}, {"patina", "BC1 + BC5", "ASTC 12x12"})
         self.assertEqual([row["lost_mip0"] for row in rows if row["codec"] == "patina" and row["set"] == "brick"],
                          ["0.25"] * 4)
+
+    def test_takes_every_material_of_a_folder_that_holds_several(self):
+        os.makedirs(self.path("sets", "pair"))
+        open(self.path("sets", "pair", "x_color.png"), "w", encoding="utf-8").close()
+        done = self.run_script("--only", "pair", peers="none")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        table = self.read("out", "table.md")
+        for asset in ("pair_left", "pair_right"):
+            self.assertIn(f"| {asset} | 64×32 | 2 | bcf-1k | standard | patina |", table)
 
     def test_goes_on_where_it_stopped(self):
         self.run_script("--only", "brick")
