@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
+#include "formats/base/check.h"
 #include "pipeline/color/color.h"
 #include "pipeline/metrics/ssim.h"
 
@@ -23,11 +25,16 @@ Direction Normalized(const Direction& a) {
   return {a.x * inverse, a.y * inverse, a.z * inverse};
 }
 
-// Centre of a texel and its solid angle.
-Direction TexelDirection(double column, double row, int columns, int rows) {
-  const double theta = kPi * (row + 0.5) / rows, phi = 2 * kPi * ((column + 0.5) / columns - 0.5);
+// The direction at the angle theta from the top and the fraction `turn` of the way round.
+Direction LatLongDirection(double theta, double turn) {
+  const double phi = 2 * kPi * (turn - 0.5);
   return {static_cast<float>(std::sin(theta) * std::sin(phi)), static_cast<float>(std::cos(theta)),
           static_cast<float>(std::sin(theta) * std::cos(phi))};
+}
+
+// Centre of a texel and its solid angle.
+Direction TexelDirection(double column, double row, int columns, int rows) {
+  return LatLongDirection(kPi * (row + 0.5) / rows, (column + 0.5) / columns);
 }
 
 double TexelSolidAngle(int row, int columns, int rows) {
@@ -96,6 +103,44 @@ Environment ReduceEnvironment(std::span<const float> map, int width, int height,
   return environment;
 }
 
+Environment ReduceEnvironmentEvenly(std::span<const float> map, int width, int height, int channels,
+                                    int columns) {
+  const int rows = columns / 2;
+  std::vector<int> texels(rows);
+  std::vector<size_t> first(rows);
+  Environment environment;
+  for (int row = 0; row < rows; ++row) {
+    texels[row] =
+        std::max(3, static_cast<int>(std::lround(columns * std::sin(kPi * (row + 0.5) / rows))));
+    first[row] = environment.lights.size();
+    for (int column = 0; column < texels[row]; ++column) {
+      Environment::Light light{};
+      const double theta = kPi * (row + 0.5) / rows;
+      light.direction = LatLongDirection(theta, (column + 0.5) / texels[row]);
+      environment.lights.push_back(light);
+    }
+  }
+  std::vector<double> sums(environment.lights.size() * 3);
+  for (int y = 0; y < height; ++y) {
+    const double solid_angle = TexelSolidAngle(y, width, height);
+    const auto row = static_cast<int>((2 * static_cast<int64_t>(y) + 1) * rows / (2 * height));
+    for (int x = 0; x < width; ++x) {
+      const auto column =
+          static_cast<int>((2 * static_cast<int64_t>(x) + 1) * texels[row] / (2 * width));
+      for (int c = 0; c < 3; ++c) {
+        sums[(first[row] + column) * 3 + c] +=
+            solid_angle *
+            static_cast<double>(map[(static_cast<size_t>(y) * width + x) * channels + c]);
+      }
+    }
+  }
+  for (size_t l = 0; l < environment.lights.size(); ++l) {
+    for (int c = 0; c < 3; ++c)
+      environment.lights[l].power[c] = static_cast<float>(sums[3 * l + c]);
+  }
+  return environment;
+}
+
 Environment StudioEnvironment(int columns, int rows) {
   struct Lamp {
     Direction towards;
@@ -129,11 +174,26 @@ Environment StudioEnvironment(int columns, int rows) {
 
 SphereImage RenderSphere(const EvaluatePairs& evaluate, const Environment& environment, int side,
                          float exposure, ThreadPool& pool) {
-  SphereImage image;
-  image.side = side;
-  image.rgb.resize(static_cast<size_t>(side) * side * 3);
-  image.inside.resize(static_cast<size_t>(side) * side);
-  const size_t lights = environment.lights.size();
+  return std::move(RenderSpheres(evaluate, {&environment, 1}, side, exposure, pool)[0]);
+}
+
+std::vector<SphereImage> RenderSpheres(const EvaluatePairs& evaluate,
+                                       std::span<const Environment> environments, int side,
+                                       float exposure, ThreadPool& pool) {
+  const std::vector<Environment::Light>& directions = environments[0].lights;
+  const size_t lights = directions.size();
+  for (const Environment& environment : environments) {
+    PATINA_CHECK(environment.lights.size() == lights);
+    for (size_t l = 0; l < lights; ++l) {
+      const Direction &a = environment.lights[l].direction, &b = directions[l].direction;
+      PATINA_CHECK(a.x == b.x && a.y == b.y && a.z == b.z);
+    }
+  }
+  SphereImage empty;
+  empty.side = side;
+  empty.rgb.resize(static_cast<size_t>(side) * side * 3);
+  empty.inside.resize(static_cast<size_t>(side) * side);
+  std::vector<SphereImage> images(environments.size(), empty);
   struct Scratch {
     std::vector<Direction> wi, wo;
     std::vector<float> rgb;
@@ -152,28 +212,32 @@ SphereImage RenderSphere(const EvaluatePairs& evaluate, const Environment& envir
       Direction normal, view;
       if (!HitSphere(x, y, side, &normal, &view)) continue;
       const size_t pixel = static_cast<size_t>(y) * side + x;
-      image.inside[pixel] = 1;
       const Frame frame = FrameAt(normal);
       const Direction to_camera = frame.ToLocal(view);
       size_t count = 0;
       for (size_t l = 0; l < lights; ++l) {
-        const Direction local = frame.ToLocal(environment.lights[l].direction);
+        const Direction local = frame.ToLocal(directions[l].direction);
         if (!(local.z > 0) || !(to_camera.z > 0)) continue;
         own.wi[count] = local;
         own.wo[count] = to_camera;
         own.light[count++] = static_cast<int>(l);
       }
       evaluate(worker, count, own.wi.data(), own.wo.data(), own.rgb.data());
-      double sum[3] = {0, 0, 0};
-      for (size_t k = 0; k < count; ++k) {
-        const Environment::Light& light = environment.lights[own.light[k]];
+      for (size_t e = 0; e < environments.size(); ++e) {
+        SphereImage& image = images[e];
+        image.inside[pixel] = 1;
+        double sum[3] = {0, 0, 0};
+        for (size_t k = 0; k < count; ++k) {
+          const Environment::Light& light = environments[e].lights[own.light[k]];
+          for (int c = 0; c < 3; ++c)
+            sum[c] += static_cast<double>(light.power[c] * own.rgb[3 * k + c] * own.wi[k].z);
+        }
         for (int c = 0; c < 3; ++c)
-          sum[c] += static_cast<double>(light.power[c] * own.rgb[3 * k + c] * own.wi[k].z);
+          image.rgb[3 * pixel + c] = exposure * static_cast<float>(sum[c]);
       }
-      for (int c = 0; c < 3; ++c) image.rgb[3 * pixel + c] = exposure * static_cast<float>(sum[c]);
     }
   });
-  return image;
+  return images;
 }
 
 ImageError CompareSpheres(const SphereImage& reference, const SphereImage& test, ThreadPool& pool) {

@@ -27,6 +27,11 @@ struct Environment {
 // >= 3, values finite.
 Environment ReduceEnvironment(std::span<const float> map, int width, int height, int channels,
                               int columns, int rows);
+// The same with texels of nearly equal area: columns / 2 rows, each with as many texels as its
+// middle's sine asks for, and no fewer than three. Maps of all sizes give the same directions.
+// columns >= 4, even; the map has at least columns x columns / 2 texels.
+Environment ReduceEnvironmentEvenly(std::span<const float> map, int width, int height, int channels,
+                                    int columns);
 // A sky, a ground and three soft lamps, for when there is no map.
 Environment StudioEnvironment(int columns, int rows);
 
@@ -46,6 +51,13 @@ struct SphereImage {
 // Radiance is the sum over all lights, times exposure.
 SphereImage RenderSphere(const EvaluatePairs& evaluate, const Environment& environment, int side,
                          float exposure, ThreadPool& pool);
+
+// The same under several environments at once, which share their lights' directions: the BRDF,
+// which costs most, is evaluated once for all. Image by image the bits of RenderSphere. At least
+// one.
+std::vector<SphereImage> RenderSpheres(const EvaluatePairs& evaluate,
+                                       std::span<const Environment> environments, int side,
+                                       float exposure, ThreadPool& pool);
 
 // Errors over the sphere's pixels of images clamped to [0, 1]: linear, and coded with the sRGB
 // curve. SSIM: mean over channels of the coded images, whole frame.

@@ -58,6 +58,47 @@ TEST(SphereRender, ReducingAMapKeepsItsLight) {
   EXPECT_GT(sums[0], 0);
 }
 
+std::vector<float> Ramp(int width, int height) {
+  std::vector<float> map(static_cast<size_t>(width) * height * 3);
+  for (size_t i = 0; i < map.size(); ++i) map[i] = 0.5f + 0.001f * static_cast<float>(i % 997);
+  return map;
+}
+
+TEST(SphereRender, EvenTexelsKeepTheLightAndShareTheSphere) {
+  const std::vector<float> map = Ramp(100, 50), white(200 * 100 * 3, 1.0f);
+  const Environment even = ReduceEnvironmentEvenly(map, 100, 50, 3, 24),
+                    full = ReduceEnvironment(map, 100, 50, 3, 100, 50);
+  double sums[2] = {0, 0};
+  for (const auto& light : even.lights) sums[0] += static_cast<double>(light.power[2]);
+  for (const auto& light : full.lights) sums[1] += static_cast<double>(light.power[2]);
+  EXPECT_NEAR(sums[0], sums[1], 1e-5 * sums[1]);
+  // 24 columns and 12 rows hold 288 texels, of which the sphere has room for 2 / pi.
+  EXPECT_NEAR(static_cast<double>(even.lights.size()), 288 * 0.6366, 6);
+  const Environment areas = ReduceEnvironmentEvenly(white, 200, 100, 3, 24);
+  ASSERT_EQ(areas.lights.size(), even.lights.size());
+  for (size_t l = 0; l < areas.lights.size(); ++l) {
+    EXPECT_EQ(areas.lights[l].direction.x, even.lights[l].direction.x);
+    // The rows at the poles have three texels where three and an eighth belong; a texel of the map
+    // in eight falls to one side of a border or the other.
+    EXPECT_NEAR(areas.lights[l].power[0], 4 * 3.14159f / 183, 0.2f * 4 * 3.14159f / 183);
+  }
+}
+
+TEST(SphereRender, SeveralEnvironmentsGiveTheImagesOfEach) {
+  ThreadPool pool(2);
+  const std::vector<float> map = Ramp(64, 32), white(64 * 32 * 3, 1.0f);
+  const Environment both[2] = {ReduceEnvironmentEvenly(map, 64, 32, 3, 16),
+                               ReduceEnvironmentEvenly(white, 64, 32, 3, 16)};
+  const auto images = RenderSpheres(Constant(0.2f), both, 24, 2, pool);
+  ASSERT_EQ(images.size(), 2u);
+  for (int e = 0; e < 2; ++e) {
+    const SphereImage alone = RenderSphere(Constant(0.2f), both[e], 24, 2, pool);
+    EXPECT_EQ(images[e].rgb, alone.rgb);
+    EXPECT_EQ(images[e].inside, alone.inside);
+  }
+  EXPECT_NE(images[0].rgb, images[1].rgb);
+}
+
 TEST(SphereRender, ComparingFindsTheDifferenceThatIsThere) {
   ThreadPool pool(1);
   const SphereImage a = RenderSphere(Constant(0.10f), StudioEnvironment(32, 16), 48, 1, pool);
