@@ -41,7 +41,13 @@ enum HeaderOffset : int {
   kReservedAt = 58
 };
 
-enum Flag : uint32_t { kIsotropic = 1, kCanonicalOrder = 2, kAngleInputs = 4, kKnownFlags = 7 };
+enum Flag : uint32_t {
+  kIsotropic = 1,
+  kCanonicalOrder = 2,
+  kAngleInputs = 4,
+  kHalfVectorInputs = 8,
+  kKnownFlags = 15
+};
 enum MapCoding : uint8_t { kBitmap = 0, kRuns = 1 };
 
 uint32_t Load16(const uint8_t* bytes) {
@@ -186,6 +192,12 @@ Status CheckSizes(int nside, int primitive_size, int index_bits) {
   return {};
 }
 
+Status CheckInputs(const IndexPack& pack) {
+  if (pack.half_vector_inputs && !pack.angle_inputs)
+    return Invalid("half_vector_inputs without angle_inputs");
+  return {};
+}
+
 Status CheckHalves(std::span<const uint16_t> halves, int primitive_size, size_t max_entries) {
   const size_t k = static_cast<size_t>(primitive_size);
   if (halves.empty() || halves.size() % k != 0 || halves.size() / k > max_entries) {
@@ -232,6 +244,7 @@ Status CheckMaps(const IndexPack& pack) {
 Status CheckPack(const IndexPack& pack) {
   PATINA_TRY(CheckSizes(pack.nside, pack.primitive_size, pack.index_bits));
   if (static_cast<int>(pack.interpolation) > 2) return Invalid("interpolation is not known");
+  PATINA_TRY(CheckInputs(pack));
   PATINA_TRY(CheckMaps(pack));
   size_t entries = size_t{1} << pack.index_bits;
   if (pack.codebook_file.empty() && pack.codebook_sha256.empty()) {
@@ -414,6 +427,8 @@ Result<IndexPack> ParseBarePack(std::span<const uint8_t> bytes) {
   pack.isotropic = (flags & kIsotropic) != 0;
   pack.canonical_order = (flags & kCanonicalOrder) != 0;
   pack.angle_inputs = (flags & kAngleInputs) != 0;
+  pack.half_vector_inputs = (flags & kHalfVectorInputs) != 0;
+  PATINA_TRY(HeaderError(CheckInputs(pack)));
 
   Body body(bytes);
   PATINA_TRY(ParseCodebookOfPack(bytes.first(kHeaderBytes), &body, &pack));
@@ -479,7 +494,8 @@ Result<std::vector<uint8_t>> EncodeIndexPack(const IndexPack& pack, int zstd_lev
   std::array<uint8_t, kHeaderBytes> header{};
   StoreLittle32(&header[kFlagsAt], (pack.isotropic ? uint32_t{kIsotropic} : 0) |
                                        (pack.canonical_order ? uint32_t{kCanonicalOrder} : 0) |
-                                       (pack.angle_inputs ? uint32_t{kAngleInputs} : 0));
+                                       (pack.angle_inputs ? uint32_t{kAngleInputs} : 0) |
+                                       (pack.half_vector_inputs ? uint32_t{kHalfVectorInputs} : 0));
   Store16(&header[kNsideAt], static_cast<uint32_t>(pack.nside));
   Store16(&header[kPrimitiveSizeAt], static_cast<uint32_t>(pack.primitive_size));
   header[kIndexBitsAt] = static_cast<uint8_t>(pack.index_bits);

@@ -28,9 +28,10 @@ struct IndexPack {
   int primitive_size = 16;  // k: floats of a primitive, 1..kMaxPrimitiveSize
   int index_bits = 9;       // b: 1..16
   Interpolation interpolation = Interpolation::kBilinear;
-  bool isotropic = true;        // pairs are folded before the lookup
-  bool canonical_order = true;  // wi and wo change places where theta_i > theta_o
-  bool angle_inputs = true;     // the network has the three inputs l, t, q after the features
+  bool isotropic = true;            // pairs are folded before the lookup
+  bool canonical_order = true;      // wi and wo change places where theta_i > theta_o
+  bool angle_inputs = true;         // the network has the three inputs l, t, q after the features
+  bool half_vector_inputs = false;  // and then X, Y; only with angle_inputs
   // One byte for each corner of a hemisphere, in corner order: 1 stored, 0 derived. Hemisphere 0 is
   // wi (S+), 1 is wo (S-). A derived corner is the mean of its parents (healpix::ParentsOf) in the
   // finest lattice of which it is a corner that is none of the lattice above; zero if there is no

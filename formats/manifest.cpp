@@ -205,6 +205,7 @@ ordered_json BrdfToJson(const ManifestBrdf& brdf) {
   json["isotropic"] = brdf.isotropic;
   json["canonical_order"] = brdf.canonical_order;
   json["angle_inputs"] = brdf.angle_inputs;
+  if (brdf.half_vector_inputs) json["half_vector_inputs"] = true;
   json["network"]["payload"] = brdf.network;
   json["network"]["layers"] = brdf.layers;
   json["network"]["activation"] = brdf.activation;
@@ -409,6 +410,8 @@ void ReadBrdfModel(const JsonView& json, ManifestBrdf* brdf) {
   brdf->isotropic = json.Field("isotropic").Bool();
   brdf->canonical_order = json.Field("canonical_order").Bool();
   brdf->angle_inputs = json.Field("angle_inputs").Bool();
+  if (const JsonView half = json.Optional("half_vector_inputs"))
+    brdf->half_vector_inputs = half.Bool();
   const JsonView network = json.Field("network");
   brdf->network = network.Field("payload").String();
   network.Field("layers").ForEach(kMaxManifestLayers + 1, [&](const JsonView& width) {

@@ -199,6 +199,7 @@ struct ManifestBrdf {
   bool isotropic = true;
   bool canonical_order = true;
   bool angle_inputs = true;
+  bool half_vector_inputs = false;         // only with angle_inputs
   std::string network;                     // name of the payload of role "weights"
   std::vector<int> layers;                 // widths: inputs, hidden ..., 3 outputs
   std::string activation = "relu";         // between layers

@@ -339,7 +339,10 @@ Status CheckBrdf(const Manifest& manifest) {
     PATINA_TRY(InRange("/brdf/network/layers/" + std::to_string(i), brdf.layers[i], 1,
                        kMaxManifestLayerWidth));
   }
-  const int inputs = 2 * brdf.primitive_size + (brdf.angle_inputs ? 3 : 0);
+  if (brdf.half_vector_inputs && !brdf.angle_inputs)
+    return Bad("/brdf/half_vector_inputs", "true without angle_inputs");
+  const int inputs =
+      2 * brdf.primitive_size + (brdf.angle_inputs ? 3 : 0) + (brdf.half_vector_inputs ? 2 : 0);
   if (brdf.layers.front() != inputs || brdf.layers.back() != 3) {
     return Bad("/brdf/network/layers", std::to_string(brdf.layers.front()) + " inputs and " +
                                            std::to_string(brdf.layers.back()) + " outputs, not " +

@@ -343,6 +343,7 @@ class BrdfDecoder {
     float x[kMaxWidth];
     float y[kMaxWidth];
     if (angle_inputs_) AngleInputs(a, b, x + 2 * k_);
+    if (half_vector_inputs_) HalfVectorInputs(a, b, x + 2 * k_ + 3);
     if (isotropic_) Fold(a, b);
     Feature(0, a, x);
     Feature(1, b, x + k_);
@@ -394,6 +395,17 @@ class BrdfDecoder {
       return false;
     }
   };
+
+  // X, Y of FORMATS.md, "BRDF": where the half vector lies.
+  static void HalfVectorInputs(const float a[3], const float b[3], float out[2]) {
+    float h[3];
+    for (int d = 0; d < 3; ++d) h[d] = a[d] + b[d];
+    const float length = std::sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
+    for (int d = 0; d < 2; ++d) {
+      const float size = std::abs(h[d]) / std::max(length, 1e-12f);
+      out[d] = std::copysign(std::log(1 + 200 * size) / 5.30330491f, h[d]);
+    }
+  }
 
   // l, t, q of FORMATS.md, "BRDF": the half angle, the difference angle and sin 2 phi_d.
   static void AngleInputs(const float a[3], const float b[3], float out[3]) {
@@ -540,13 +552,14 @@ class BrdfDecoder {
     k_ = Load16(bytes, 30);
     const uint32_t bits = Load8(bytes, 36);
     interpolation_ = static_cast<int>(Load8(bytes, 37));
-    if (flags > 7 || nside_ < 1 || nside_ > 1024 || k_ < 1 || k_ > 64 || bits < 1 || bits > 16 ||
-        interpolation_ > 2) {
+    if (flags > 15 || (flags & 12) == 8 || nside_ < 1 || nside_ > 1024 || k_ < 1 || k_ > 64 ||
+        bits < 1 || bits > 16 || interpolation_ > 2) {
       return corrupt("the header is not legal");
     }
     isotropic_ = (flags & 1) != 0;
     canonical_order_ = (flags & 2) != 0;
     angle_inputs_ = (flags & 4) != 0;
+    half_vector_inputs_ = (flags & 8) != 0;
     corners_ = static_cast<size_t>(RingStart(nside_, 2 * nside_ + 2));
     if (2 * corners_ * k_ > kMaxFloats) return corrupt("too large for this decoder");
 
@@ -676,7 +689,7 @@ class BrdfDecoder {
       }
       return corrupt("there is no tensor " + name);
     };
-    size_t inputs = 2 * k_ + (angle_inputs_ ? 3 : 0);
+    size_t inputs = 2 * k_ + (angle_inputs_ ? 3 : 0) + (half_vector_inputs_ ? 2 : 0);
     for (size_t l = 0; l < count / 2; ++l) {
       const std::string name = "layer" + std::to_string(l);
       uint32_t shape[2], bias_shape[2];
@@ -725,6 +738,7 @@ class BrdfDecoder {
   bool isotropic_ = true;
   bool canonical_order_ = true;
   bool angle_inputs_ = true;
+  bool half_vector_inputs_ = false;
   std::vector<float> features_;  // [hemisphere][corner][k]
   std::vector<brdf_decoder_detail::Layer> layers_;
   BrdfSampler sampler_;

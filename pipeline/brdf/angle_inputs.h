@@ -1,7 +1,8 @@
-// The three scalars that the network sees besides the features, and the canonical form of a pair of
+// The scalars that the network sees besides the features, and the canonical form of a pair of
 // directions.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -34,6 +35,16 @@ inline void AngleInputs(const Direction& wi, const Direction& wo, float out[3]) 
   out[0] = 2 * std::log(1 + 200 * theta_h) / 5.75f - 1;
   out[1] = 4 * theta_d / kPi - 1;
   out[2] = squared > 4e-12f ? 2 * dx * dy / squared : 0.0f;
+}
+
+// Where the half vector of an anisotropic material lies: X and Y, its components along the tangent
+// and the bitangent, v -> sign(v) log(1 + 200 |v|) / log(201), each in [-1, 1]. Unchanged when wi
+// and wo are exchanged.
+inline void HalfVectorInputs(const Direction& wi, const Direction& wo, float out[2]) {
+  const float sx = wi.x + wo.x, sy = wi.y + wo.y, sz = wi.z + wo.z;
+  const float inverse = 1 / std::max(std::sqrt(sx * sx + sy * sy + sz * sz), 1e-12f);
+  out[0] = std::copysign(std::log(1 + 200 * std::abs(sx * inverse)) / 5.30330491f, sx);
+  out[1] = std::copysign(std::log(1 + 200 * std::abs(sy * inverse)) / 5.30330491f, sy);
 }
 
 // Exchanges the two so that wi is the one nearer to the normal: a model that only sees such pairs

@@ -26,8 +26,8 @@ Result<BatchEvaluator> BatchEvaluator::Create(const IndexPack& pack,
   PATINA_ASSIGN(const SimdTarget target, ActiveSimdTarget());
   BatchEvaluator evaluator;
   evaluator.kernels_ = &KernelsFor(target);
-  evaluator.grid_ = {pack.nside, pack.interpolation, pack.isotropic, pack.canonical_order,
-                     pack.angle_inputs};
+  evaluator.grid_ = {pack.nside,           pack.interpolation, pack.isotropic,
+                     pack.canonical_order, pack.angle_inputs,  pack.half_vector_inputs};
   const int layers = static_cast<int>(network.tensors.size() / 2);
   const WeightTensor* first = FindTensor(network, "layer0.weight");
   if (layers < 2 || first == nullptr || first->shape.size() != 2)
@@ -88,8 +88,8 @@ void BatchEvaluator::Evaluate(Scratch* scratch, size_t count, const Direction* w
     task.count = static_cast<int>(std::min<size_t>(kChunkRows, count - first));
     PoolSample* samples = scratch->samples_.data();
     if (grid_.interpolation == healpix::Interpolation::kBilinear) {
-      const LookUpGrid grid = {grid_.nside, grid_.corners(), grid_.isotropic, grid_.canonical_order,
-                               grid_.angle_inputs};
+      const LookUpGrid grid = {grid_.nside,           grid_.corners(),    grid_.isotropic,
+                               grid_.canonical_order, grid_.angle_inputs, grid_.half_vector_inputs};
       kernels_->look_up_pairs(grid, wi + first, wo + first, task.count, samples);
     } else {
       for (int s = 0; s < task.count; ++s)

@@ -21,6 +21,7 @@
 namespace patina::brdf {
 
 inline constexpr int kChunkRows = 128;
+inline constexpr int kMaxExtraInputs = 5;
 inline constexpr int kOutputs = 3;  // y of red, green, blue; f = exp(y) - 1
 inline constexpr float kMaxLogValue = 12.0f;
 
@@ -43,7 +44,7 @@ struct NetworkLayout {
 
   int primitive_size;  // k
   int feature_stride;  // k rounded up to 16: floats between rows of features
-  int extra_inputs;    // 0 or 3
+  int extra_inputs;    // 0, 3 or 5
   int hidden;
   std::vector<DenseLayer> layers;
   size_t parameter_count = 0;
@@ -56,19 +57,19 @@ struct NetworkLayout {
 
 // One training sample, looked up once: corners are rows of the grid of both hemispheres.
 struct alignas(32) PoolSample {
-  int32_t corner[8];  // four of wi, four of wo
-  float weight[8];    // of the corners
-  float extra[3];     // the scalar inputs l, t, q
-  float value[3];     // f, 1/sr
-  float cosine;       // of the direction that is nearer to the normal
-  float importance;   // factor of the loss
+  int32_t corner[8];             // four of wi, four of wo
+  float weight[8];               // of the corners
+  float extra[kMaxExtraInputs];  // the scalar inputs l, t, q, X, Y
+  float value[3];                // f, 1/sr
+  float cosine;                  // of the direction that is nearer to the normal
+  float importance;              // factor of the loss
 };
 
 // What a lookup needs to know of the grid; bilinear weights.
 struct LookUpGrid {
   int nside = 1;
   int corners = 0;  // of one hemisphere: where those of wo begin
-  bool isotropic = true, canonical_order = true, angle_inputs = true;
+  bool isotropic = true, canonical_order = true, angle_inputs = true, half_vector_inputs = false;
 };
 
 struct ChunkScratch {
@@ -99,6 +100,7 @@ struct ChunkTask {
 
 struct AdamSettings {
   float rate = 0;
+  float decay = 0;  // of the parameters themselves, per step and rate (AdamW)
   float beta1 = 0.9f, beta2 = 0.99f, epsilon = 1e-8f;
   float correction1 = 1, correction2 = 1;  // 1 / (1 - beta^t)
 };
@@ -121,6 +123,12 @@ struct BrdfKernels {
   // order.
   void (*scatter)(const NetworkLayout& layout, const PoolSample* samples, int count, int hemisphere,
                   const ChunkResult& result, float* gradient);
+  // gradient[j] = p_j (s_j - <p, s>) / temperature with p = softmax(logits / temperature) and s_j
+  // = <code j, feature gradient>: design/neural-brdf. columns: a multiple of 16; a column of
+  // padding has a logit below all others by 1e4 or more. transposed: codebook [stride][columns].
+  void (*softmax_gradient)(const float* logits, int columns, float temperature,
+                           const float* transposed, const float* feature_gradient, int stride,
+                           float* gradient);
   // One Adam step of `count` floats, a multiple of 16; clears the gradient.
   void (*adam)(float* parameters, float* gradient, float* moment1, float* moment2, size_t count,
                const AdamSettings& settings);

@@ -178,12 +178,37 @@ void Scatter(const NetworkLayout& layout, const PoolSample* samples, int count, 
   }
 }
 
+void SoftmaxGradient(const float* logits, int columns, float temperature, const float* transposed,
+                     const float* feature_gradient, int stride, float* gradient) {
+  F16 largest = Load(logits);
+  for (int j = 16; j < columns; j += 16) largest = Max(largest, Load(logits + j));
+  const F16 top = Set(ReduceMax(largest)), inverse = Set(1 / temperature);
+  F16 mass = Zero(), mean = Zero();
+  for (int j = 0; j < columns; j += 16) {
+    F16 s = Zero();
+    for (int k = 0; k < stride; ++k)
+      s = MulAdd(Set(feature_gradient[k]),
+                 Load(transposed + static_cast<ptrdiff_t>(k) * columns + j), s);
+    const F16 p = Exp(Max((Load(logits + j) - top) * inverse, Set(-80.0f)));
+    mass = mass + p;
+    mean = MulAdd(p, s, mean);
+    Store(gradient + j, s);
+  }
+  const float total = ReduceSum(mass);
+  const F16 centre = Set(ReduceSum(mean) / total), scale = Set(1 / (total * temperature));
+  for (int j = 0; j < columns; j += 16) {
+    const F16 p = Exp(Max((Load(logits + j) - top) * inverse, Set(-80.0f)));
+    Store(gradient + j, p * scale * (Load(gradient + j) - centre));
+  }
+}
+
 void Adam(float* parameters, float* gradient, float* moment1, float* moment2, size_t count,
           const brdf::AdamSettings& settings) {
   const F16 beta1 = Set(settings.beta1), rest1 = Set(1 - settings.beta1);
   const F16 beta2 = Set(settings.beta2), rest2 = Set(1 - settings.beta2);
   const F16 rate = Set(settings.rate * settings.correction1),
-            correction2 = Set(settings.correction2), epsilon = Set(settings.epsilon);
+            correction2 = Set(settings.correction2), epsilon = Set(settings.epsilon),
+            kept = Set(1 - settings.rate * settings.decay);
   for (size_t i = 0; i < count; i += 16) {
     const F16 g = Load(gradient + i);
     const F16 m = MulAdd(rest1, g, beta1 * Load(moment1 + i));
@@ -191,14 +216,15 @@ void Adam(float* parameters, float* gradient, float* moment1, float* moment2, si
     Store(moment1 + i, m);
     Store(moment2 + i, v);
     Store(gradient + i, Zero());
-    Store(parameters + i, Load(parameters + i) - rate * m / (Sqrt(v * correction2) + epsilon));
+    Store(parameters + i,
+          kept * Load(parameters + i) - rate * m / (Sqrt(v * correction2) + epsilon));
   }
 }
 
 }  // namespace
 
 extern const brdf::BrdfKernels kBrdfKernels;
-const brdf::BrdfKernels kBrdfKernels = {TrainChunk,   ForwardChunk, LookUpPairs,
-                                        OutputValues, Scatter,      Adam};
+const brdf::BrdfKernels kBrdfKernels = {TrainChunk, ForwardChunk,    LookUpPairs, OutputValues,
+                                        Scatter,    SoftmaxGradient, Adam};
 
 }  // namespace patina::PATINA_SIMD

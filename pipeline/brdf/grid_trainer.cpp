@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace patina::brdf {
 namespace {
@@ -12,8 +13,9 @@ float Correction(float beta, int steps) {
                        : static_cast<float>(1 / (1 - std::pow(static_cast<double>(beta), steps)));
 }
 
-AdamSettings Settings(float rate, int steps) {
+AdamSettings Settings(float rate, float decay, int steps) {
   AdamSettings settings;
+  settings.decay = decay;
   settings.rate = rate;
   settings.correction1 = Correction(settings.beta1, steps);
   settings.correction2 = Correction(settings.beta2, steps);
@@ -107,7 +109,7 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
       }
       kernels_.adam(parameters_.data(), parameter_gradient_.data(), parameter_moment1_.data(),
                     parameter_moment2_.data(), layout_.parameter_count,
-                    Settings(rates.network, steps_));
+                    Settings(rates.network, rates.decay, steps_));
       TransposeWeights(layout_, parameters_.data(), transposed_.data());
       return;
     }
@@ -129,8 +131,8 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
     }
     for (const int32_t row : rows) touched_[row] = 0;
     if (!has_codebook())
-      UpdateRows(rows, Settings(rates.features, steps_), features_.data(), gradient_.data(),
-                 moment1_.data(), moment2_.data());
+      UpdateRows(rows, Settings(rates.features, rates.decay, steps_), features_.data(),
+                 gradient_.data(), moment1_.data(), moment2_.data());
   });
   if (!has_codebook()) return true;
 
@@ -145,6 +147,7 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
         code_rows_.push_back(code);
       }
       float* from = gradient_.data() + static_cast<size_t>(corner) * stride;
+      if (soft_) soft_->Accumulate(corner, from);
       float* to = code_gradient_.data() + static_cast<size_t>(code) * stride;
       for (size_t k = 0; k < stride; ++k) {
         to[k] += from[k];
@@ -153,9 +156,19 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
     }
   }
   for (const int32_t code : code_rows_) code_touched_[code] = 0;
-  UpdateRows(code_rows_, Settings(rates.features, code_steps_), codebook_.data(),
+  UpdateRows(code_rows_, Settings(rates.features, rates.decay, code_steps_), codebook_.data(),
              code_gradient_.data(), code_moment1_.data(), code_moment2_.data());
+  if (soft_ && code_steps_ % kStepsPerUpdate == 0) {
+    soft_->Update(codebook_.data(), rates.temperature, Settings(rates.logits, 0, ++logit_steps_),
+                  index_);
+  }
   return true;
+}
+
+void GridTrainer::UseSoftIndex(std::unique_ptr<SoftIndex> soft) {
+  soft_ = std::move(soft);
+  soft_->WriteIndices(index_);
+  logit_steps_ = 0;
 }
 
 void GridTrainer::UseCodebook(std::vector<float> codebook, std::vector<int32_t> index) {

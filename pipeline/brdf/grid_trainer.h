@@ -12,12 +12,16 @@
 #include "pipeline/base/rng.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/brdf/brdf_kernels.h"
+#include "pipeline/brdf/soft_index.h"
 
 namespace patina::brdf {
 
 struct StepRates {
   float features = 0;  // or, once there is a codebook, of its codes
   float network = 0;
+  float decay = 0;   // of features, codes and weights, per step and rate
+  float logits = 0;  // of a soft index
+  float temperature = 1;
 };
 
 // Corners are numbered through both grids; rows of features have layout.feature_stride floats.
@@ -36,6 +40,10 @@ class GridTrainer {
   // Goes over to a codebook: `codes` rows and an index for each corner. From here on steps move the
   // codes; the index stays.
   void UseCodebook(std::vector<float> codebook, std::vector<int32_t> index);
+  // Lets the index move as well: from now on its logits take a step with every kStepsPerUpdate-th
+  // step of the codes. There is a codebook; the soft index has its number of codes.
+  void UseSoftIndex(std::unique_ptr<SoftIndex> soft);
+  static constexpr int kStepsPerUpdate = 8;
   bool has_codebook() const { return !index_.empty(); }
 
   // y of samples in order: [count][3].
@@ -62,11 +70,12 @@ class GridTrainer {
   AlignedBuffer<float> features_, gradient_, moment1_, moment2_;
   AlignedBuffer<float> codebook_, code_gradient_, code_moment1_, code_moment2_;
   std::vector<int32_t> index_;
+  std::unique_ptr<SoftIndex> soft_;
   std::vector<std::unique_ptr<ChunkScratch>> scratch_;
   std::vector<std::unique_ptr<ChunkResult>> results_;
   std::vector<uint8_t> touched_, code_touched_;
   std::vector<int32_t> rows_[2], code_rows_;
-  int steps_ = 0, code_steps_ = 0;
+  int steps_ = 0, code_steps_ = 0, logit_steps_ = 0;
 };
 
 }  // namespace patina::brdf

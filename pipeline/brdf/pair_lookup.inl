@@ -116,6 +116,20 @@ PATINA_INLINE void AngleInputs16(const Directions16& wi, const Directions16& wo,
   out[2] = ZeroUnless(squared > Set(4e-12f), Set(2.0f) * dx * dy / Max(squared, Set(1e-30f)));
 }
 
+PATINA_INLINE F16 SignedLog16(F16 v) {
+  const F16 size = Log(MulAdd(Set(200.0f), Abs(v), Set(1.0f))) * Set(1 / 5.30330491f);
+  return Select(v < Zero(), Zero() - size, size);
+}
+
+// brdf::HalfVectorInputs.
+PATINA_INLINE void HalfVectorInputs16(const Directions16& wi, const Directions16& wo, F16 out[2]) {
+  const F16 sx = wi.x + wo.x, sy = wi.y + wo.y, sz = wi.z + wo.z;
+  const F16 length = Sqrt(MulAdd(sz, sz, MulAdd(sx, sx, sy * sy)));
+  const F16 inverse = Set(1.0f) / Max(length, Set(1e-12f));
+  out[0] = SignedLog16(sx * inverse);
+  out[1] = SignedLog16(sy * inverse);
+}
+
 PATINA_STAGE void LookUpPairs(const brdf::LookUpGrid& grid, const brdf::Direction* wi,
                               const brdf::Direction* wo, int count, brdf::PoolSample* samples) {
   alignas(64) float lanes[6][16];
@@ -135,8 +149,16 @@ PATINA_STAGE void LookUpPairs(const brdf::LookUpGrid& grid, const brdf::Directio
       out = {Select(exchange, a.x, out.x), Select(exchange, a.y, out.y),
              Select(exchange, a.z, out.z)};
     }
-    F16 extra[3];
-    if (grid.angle_inputs) AngleInputs16(in, out, extra);
+    F16 extra[brdf::kMaxExtraInputs];
+    int extras = 0;
+    if (grid.angle_inputs) {
+      AngleInputs16(in, out, extra);
+      extras = 3;
+    }
+    if (grid.half_vector_inputs) {
+      HalfVectorInputs16(in, out, extra + 3);
+      extras = 5;
+    }
     if (grid.isotropic) {
       const F16 radius = Length(in.x, in.y);
       const M16 pole = radius < Set(1e-7f);
@@ -152,7 +174,7 @@ PATINA_STAGE void LookUpPairs(const brdf::LookUpGrid& grid, const brdf::Directio
     LookUpCorners(grid.nside, in, grid.isotropic, &near);
     LookUpCorners(grid.nside, out, false, &far);
     alignas(64) int32_t index[8][16];
-    alignas(64) float weight[8][16], scalar[3][16];
+    alignas(64) float weight[8][16], scalar[brdf::kMaxExtraInputs][16];
     const I16 second = SetI(grid.corners);
     Unroll<4>([&](auto c) PATINA_LAMBDA {
       StoreI(index[c], near.index[c]);
@@ -160,15 +182,13 @@ PATINA_STAGE void LookUpPairs(const brdf::LookUpGrid& grid, const brdf::Directio
       Store(weight[c], near.weight[c]);
       Store(weight[4 + c], far.weight[c]);
     });
-    if (grid.angle_inputs) Unroll<3>([&](auto e) PATINA_LAMBDA { Store(scalar[e], extra[e]); });
+    for (int e = 0; e < extras; ++e) Store(scalar[e], extra[e]);
     const int used = count - first < 16 ? count - first : 16;
     for (int l = 0; l < used; ++l) {
       brdf::PoolSample& sample = samples[first + l];
       for (int c = 0; c < 8; ++c) sample.corner[c] = index[c][l];
       for (int c = 0; c < 8; ++c) sample.weight[c] = weight[c][l];
-      if (grid.angle_inputs) {
-        for (int e = 0; e < 3; ++e) sample.extra[e] = scalar[e][l];
-      }
+      for (int e = 0; e < extras; ++e) sample.extra[e] = scalar[e][l];
     }
   }
 }

@@ -25,6 +25,7 @@ void FillValue(const float rgb[3], float weight, const Direction& wi, const Dire
 void LookUpPair(const GridShape& shape, Direction wi, Direction wo, PoolSample* sample) {
   if (shape.canonical_order) MakeCanonical(&wi, &wo);
   if (shape.angle_inputs) AngleInputs(wi, wo, sample->extra);
+  if (shape.half_vector_inputs) HalfVectorInputs(wi, wo, sample->extra + 3);
   float in[3] = {wi.x, wi.y, wi.z}, out[3] = {wo.x, wo.y, wo.z};
   if (shape.isotropic) healpix::FoldIsotropic(in, out);
   const auto near = healpix::LookUp(shape.nside, in, shape.interpolation);

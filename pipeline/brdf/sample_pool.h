@@ -15,14 +15,15 @@ namespace patina::brdf {
 
 // What of a model decides how a pair of directions is looked up.
 struct GridShape {
-  int nside = 32;
+  int nside = 16;
   healpix::Interpolation interpolation = healpix::Interpolation::kBilinear;
-  bool isotropic = true;        // the azimuth is folded: wi at 0, wo at |phi_o - phi_i|
-  bool canonical_order = true;  // wi is the direction nearer to the normal: exactly reciprocal
-  bool angle_inputs = true;     // the scalars of angle_inputs.h
+  bool isotropic = true;            // the azimuth is folded: wi at 0, wo at |phi_o - phi_i|
+  bool canonical_order = true;      // wi is the direction nearer to the normal: exactly reciprocal
+  bool angle_inputs = true;         // the scalars l, t, q of angle_inputs.h
+  bool half_vector_inputs = false;  // and X, Y: of use to anisotropic materials; needs angle_inputs
 
   int corners() const { return healpix::CornerCount(nside); }  // of one grid
-  int extra_inputs() const { return angle_inputs ? 3 : 0; }
+  int extra_inputs() const { return !angle_inputs ? 0 : half_vector_inputs ? 5 : 3; }
 };
 
 // Corners, weights and scalars of a pair of directions above the horizon. Corners of wi are 0 ..

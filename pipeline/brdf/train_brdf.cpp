@@ -52,42 +52,58 @@ double HeldOutLoss(GridTrainer* trainer, const PoolSample* samples, size_t count
 
 class Session {
  public:
-  Session(const Source& source, const ModelShape& shape, const TrainOptions& options,
-          ThreadPool& pool, ProgressSink& progress, const BrdfKernels& kernels)
+  Session(std::span<const Source* const> sources, const ModelShape& shape,
+          const TrainOptions& options, ThreadPool& pool, ProgressSink& progress,
+          const BrdfKernels& kernels)
       : shape_(shape),
         options_(options),
         pool_(pool),
         progress_(progress),
+        kernels_(kernels),
+        materials_(static_cast<int>(sources.size())),
         layout_(shape.primitive_size, shape.grid.extra_inputs(), shape.hidden, shape.hidden_layers),
-        trainer_(layout_, 2 * shape.grid.corners(), kernels, pool, options.seed) {
-    PoolOptions pool_options;
-    pool_options.count = options.pool + kHeldOut;
-    pool_options.half_angle_share = options.half_angle_share;
-    pool_options.seed = options.seed;
-    samples_ = DrawPool(source, shape.grid, pool_options, pool);
+        trainer_(layout_, 2 * materials_ * shape.grid.corners(), kernels, pool, options.seed) {
+    DrawSamples(sources);
   }
 
-  Result<TrainedBrdf> Run() {
+  Result<std::vector<TrainedBrdf>> Run() {
     if (samples_.size() < 64)
       return Fail(ErrorCode::kCorruptData, "too few directions have valid data to train on");
     held_out_ = std::min(kHeldOut, samples_.size() / 8);
     train_count_ = samples_.size() - held_out_;
     CountUsage();
-    const int total = options_.free_steps + options_.codebook_steps;
-    for (int step = 0; step < options_.free_steps; ++step) {
+    // Twice as many materials get half as many steps more.
+    const double growth = 0.5 + 0.5 * materials_;
+    const int total = static_cast<int>(growth * (options_.free_steps + options_.codebook_steps));
+    const bool has_free_part = options_.index_training != IndexTraining::kSoftmax;
+    const int free_steps = has_free_part ? static_cast<int>(growth * options_.free_steps) : 0;
+    const int code_steps = total - free_steps;
+    for (int step = 0; step < free_steps; ++step) {
       if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
-      const float factor = CosineRate(step, options_.free_steps);
-      Step({options_.feature_rate * factor, options_.network_rate * factor});
+      const float factor = CosineRate(step, free_steps);
+      Step({options_.feature_rate * factor, options_.network_rate * factor, options_.decay});
+      PullToCodes(step, free_steps);
       Report(step, total);
     }
     result_.free_loss = HeldOut();
     Record();
-    StartCodebook();
-    for (int step = 0; step < options_.codebook_steps; ++step) {
+    if (has_free_part) {
+      StartCodebook();
+    } else {
+      StartCodesAtRandom();
+    }
+    for (int step = 0; step < code_steps; ++step) {
       if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
-      const float factor = CosineRate(step, options_.codebook_steps);
-      Step({options_.codebook_rate * factor, options_.codebook_network_rate * factor});
-      Report(options_.free_steps + step, total);
+      const float factor = CosineRate(step, code_steps);
+      StepRates rates;
+      rates.features = factor * (has_free_part ? options_.codebook_rate : options_.feature_rate);
+      rates.network =
+          factor * (has_free_part ? options_.codebook_network_rate : options_.network_rate);
+      rates.decay = options_.decay;
+      rates.logits = options_.logit_rate * factor;
+      rates.temperature = 1 - 0.5f * static_cast<float>(step) / static_cast<float>(code_steps);
+      Step(rates);
+      Report(free_steps + step, total);
     }
     result_.used_codes = UsagePerplexity(trainer_.index(), usage_, Codes());
     result_.final_loss = HeldOut();
@@ -96,6 +112,37 @@ class Session {
   }
 
  private:
+  // Samples of all materials in turn; corners of each material follow those of the one before.
+  void DrawSamples(std::span<const Source* const> sources) {
+    PoolOptions pool_options;
+    // Several materials share the memory that one may use four times over.
+    pool_options.count =
+        std::min(options_.pool, 4 * options_.pool / static_cast<size_t>(materials_)) +
+        kHeldOut / static_cast<size_t>(materials_);
+    pool_options.half_angle_share = options_.half_angle_share;
+    std::vector<AlignedBuffer<PoolSample>> pools;
+    size_t each = pool_options.count;
+    for (int m = 0; m < materials_; ++m) {
+      pool_options.seed = options_.seed + static_cast<uint64_t>(m);
+      pools.push_back(DrawPool(*sources[m], shape_.grid, pool_options, pool_));
+      each = std::min(each, pools.back().size());
+    }
+    if (materials_ == 1) {
+      samples_ = std::move(pools[0]);
+      return;
+    }
+    samples_.Reset(each * static_cast<size_t>(materials_));
+    for (int m = 0; m < materials_; ++m) {
+      const int first = 2 * m * shape_.grid.corners();
+      for (size_t s = 0; s < each; ++s) {
+        PoolSample& to = samples_[s * static_cast<size_t>(materials_) + static_cast<size_t>(m)];
+        to = pools[m][s];
+        for (int32_t& corner : to.corner) corner += first;
+      }
+      pools[m].Reset(0);
+    }
+  }
+
   bool Cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
   int Codes() const { return CodesOf(shape_); }
   double HeldOut() { return HeldOutLoss(&trainer_, samples_.data() + train_count_, held_out_); }
@@ -122,13 +169,65 @@ class Session {
             layout_.feature_stride};
   }
 
+  // Draws the features together into as many groups as there will be codes: what is left of their
+  // differences when they become codes costs little. Strongest at the end of the free steps.
+  void PullToCodes(int step, int free_steps) {
+    constexpr int kPulls = 16, kRounds = 4;
+    const int first = free_steps / 3, every = std::max(1, (free_steps - first) / kPulls);
+    if (!(options_.pull > 0) || step < first || (step - first) % every != 0) return;
+    const size_t stride = layout_.feature_stride;
+    std::vector<float> codes(static_cast<size_t>(Codes()) * stride);
+    std::vector<int32_t> index(trainer_.corners());
+    Rng rng(options_.seed, 5);
+    KMeans(Features(), usage_, Codes(), kRounds, &rng, pool_, codes.data(), index);
+    const float share = options_.pull * static_cast<float>(step - first) /
+                        static_cast<float>(std::max(1, free_steps - first));
+    for (size_t c = 0; c < index.size(); ++c) {
+      if (!(usage_[c] > 0)) continue;
+      float* feature = trainer_.features().data() + c * stride;
+      const float* code = codes.data() + static_cast<size_t>(index[c]) * stride;
+      for (size_t k = 0; k < stride; ++k) feature[k] += share * (code[k] - feature[k]);
+    }
+  }
+
   void StartCodebook() {
     std::vector<float> codes(static_cast<size_t>(Codes()) * layout_.feature_stride);
     std::vector<int32_t> index(trainer_.corners());
     Rng rng(options_.seed, 5);
     constexpr int kRounds = 25;
     KMeans(Features(), usage_, Codes(), kRounds, &rng, pool_, codes.data(), index);
+    std::unique_ptr<SoftIndex> soft;
+    if (options_.index_training == IndexTraining::kClustersThenSoftmax) {
+      soft = MakeSoftIndex();
+      constexpr float kSharpness = 4;
+      soft->StartFromFeatures(trainer_.features().data(), codes.data(), kSharpness);
+    }
     trainer_.UseCodebook(std::move(codes), std::move(index));
+    if (soft) trainer_.UseSoftIndex(std::move(soft));
+  }
+
+  void StartCodesAtRandom() {
+    std::vector<float> codes(static_cast<size_t>(Codes()) * layout_.feature_stride);
+    Rng rng(options_.seed, 6);
+    constexpr float kSpread = 0.1f;
+    for (int code = 0; code < Codes(); ++code) {
+      for (int k = 0; k < shape_.primitive_size; ++k)
+        codes[static_cast<size_t>(code) * layout_.feature_stride + k] =
+            (2 * rng.Uniform() - 1) * kSpread;
+    }
+    auto soft = MakeSoftIndex();
+    soft->StartAtRandom(options_.seed);
+    trainer_.UseCodebook(std::move(codes), std::vector<int32_t>(trainer_.corners()));
+    trainer_.UseSoftIndex(std::move(soft));
+  }
+
+  std::unique_ptr<SoftIndex> MakeSoftIndex() {
+    std::vector<int32_t> supervised;
+    for (int c = 0; c < trainer_.corners(); ++c) {
+      if (usage_[c] > 0) supervised.push_back(c);
+    }
+    return std::make_unique<SoftIndex>(std::move(supervised), Codes(), layout_.feature_stride,
+                                       kernels_, pool_);
   }
 
   void Report(int step, int total) {
@@ -153,15 +252,26 @@ class Session {
     result_.curve.push_back(point);
   }
 
-  Result<TrainedBrdf> Finish() {
+  Result<std::vector<TrainedBrdf>> Finish() {
     result_.shape = shape_;
-    MakePack();
     PATINA_TRY(MakeNetwork());
-    return std::move(result_);
+    std::vector<TrainedBrdf> all(static_cast<size_t>(materials_), result_);
+    for (int m = 0; m < materials_; ++m) all[m].pack = PackOf(m);
+    const std::vector<int> codes = DropUnusedCodes(&all);
+    for (TrainedBrdf& material : all) {
+      for (const int code : codes) {
+        for (int k = 0; k < shape_.primitive_size; ++k) {
+          material.pack.codebook.push_back(FloatToHalf(
+              trainer_.codebook()[static_cast<size_t>(code) * layout_.feature_stride + k]));
+        }
+      }
+    }
+    return all;
   }
 
-  void MakePack() {
-    IndexPack& pack = result_.pack;
+  // Without the codebook.
+  IndexPack PackOf(int material) const {
+    IndexPack pack;
     pack.nside = shape_.grid.nside;
     pack.primitive_size = shape_.primitive_size;
     pack.index_bits = shape_.index_bits;
@@ -169,22 +279,35 @@ class Session {
     pack.isotropic = shape_.grid.isotropic;
     pack.canonical_order = shape_.grid.canonical_order;
     pack.angle_inputs = shape_.grid.angle_inputs;
+    pack.half_vector_inputs = shape_.grid.half_vector_inputs;
     const int corners = shape_.grid.corners();
     for (int side = 0; side < 2; ++side) {
       pack.stored[side].resize(corners);
       for (int c = 0; c < corners; ++c) {
-        const int corner = side * corners + c;
+        const int corner = (2 * material + side) * corners + c;
         pack.stored[side][c] = usage_[corner] > 0 ? 1 : 0;
         if (usage_[corner] > 0)
           pack.indices.push_back(static_cast<uint16_t>(trainer_.index()[corner]));
       }
     }
-    for (int code = 0; code < Codes(); ++code) {
-      for (int k = 0; k < shape_.primitive_size; ++k) {
-        pack.codebook.push_back(FloatToHalf(
-            trainer_.codebook()[static_cast<size_t>(code) * layout_.feature_stride + k]));
-      }
+    return pack;
+  }
+
+  // Renumbers the indices; returns the codes that a material uses.
+  std::vector<int> DropUnusedCodes(std::vector<TrainedBrdf>* all) const {
+    std::vector<int> place(static_cast<size_t>(Codes()), -1), codes;
+    for (const TrainedBrdf& material : *all) {
+      for (const uint16_t index : material.pack.indices) place[index] = 0;
     }
+    for (int code = 0; code < Codes(); ++code) {
+      if (place[code] < 0) continue;
+      place[code] = static_cast<int>(codes.size());
+      codes.push_back(code);
+    }
+    for (TrainedBrdf& material : *all) {
+      for (uint16_t& index : material.pack.indices) index = static_cast<uint16_t>(place[index]);
+    }
+    return codes;
   }
 
   // Padding of features and hidden units goes; the weights become halves.
@@ -233,6 +356,8 @@ class Session {
   const TrainOptions& options_;
   ThreadPool& pool_;
   ProgressSink& progress_;
+  const BrdfKernels& kernels_;
+  int materials_;
   NetworkLayout layout_;
   GridTrainer trainer_;
   AlignedBuffer<PoolSample> samples_;
@@ -245,9 +370,51 @@ class Session {
 
 }  // namespace
 
+SourceKind KindOf(const Source& source) { return {source.isotropic, source.table == nullptr}; }
+
+ModelShape DefaultShape(const SourceKind& kind) {
+  ModelShape shape;
+  shape.grid.isotropic = kind.isotropic;
+  if (kind.list) {
+    shape.grid.nside = 4;
+    shape.hidden_layers = 3;
+  } else if (!kind.isotropic) {
+    shape.grid.nside = 12;
+    shape.index_bits = 10;
+    shape.hidden = 64;
+    shape.hidden_layers = 3;
+  }
+  shape.grid.half_vector_inputs = !kind.isotropic;
+  return shape;
+}
+
+TrainOptions DefaultTraining(const SourceKind& kind) {
+  TrainOptions options;
+  if (kind.list) {
+    options.pool = size_t{1} << 16;
+    options.free_steps = 3000;
+    options.codebook_steps = 1000;
+    options.decay = 0.4f;
+  } else if (!kind.isotropic) {
+    options.half_angle_share = 0.7;
+    options.free_steps = options.codebook_steps = 12000;
+    options.decay = 0.2f;
+  }
+  return options;
+}
+
 Result<TrainedBrdf> TrainBrdf(const Source& source, const ModelShape& shape,
                               const TrainOptions& options, ThreadPool& pool,
                               ProgressSink& progress) {
+  const Source* const one = &source;
+  PATINA_ASSIGN(std::vector<TrainedBrdf> trained,
+                TrainShared(std::span(&one, 1), shape, options, pool, progress));
+  return std::move(trained[0]);
+}
+
+Result<std::vector<TrainedBrdf>> TrainShared(std::span<const Source* const> sources,
+                                             const ModelShape& shape, const TrainOptions& options,
+                                             ThreadPool& pool, ProgressSink& progress) {
   PATINA_ASSIGN(const SimdTarget target, ActiveSimdTarget());
   if (shape.grid.nside < 1 || shape.grid.nside > 256 || shape.primitive_size < 1 ||
       shape.primitive_size > 64 || shape.index_bits < 1 || shape.index_bits > 12 ||
@@ -258,7 +425,7 @@ Result<TrainedBrdf> TrainBrdf(const Source& source, const ModelShape& shape,
                 "1 to 12 index bits, 1 to 4 "
                 "hidden layers of 4 to 256 units");
   }
-  return Session(source, shape, options, pool, progress, KernelsFor(target)).Run();
+  return Session(sources, shape, options, pool, progress, KernelsFor(target)).Run();
 }
 
 }  // namespace patina::brdf

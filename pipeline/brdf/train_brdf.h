@@ -7,6 +7,7 @@
 // and a canonical order of the directions, both of which can be left out.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,24 +29,59 @@ struct ModelShape {
   int hidden_layers = 2;
 };
 
+// What of a source decides the shape of its model.
+struct SourceKind {
+  bool isotropic = true;
+  bool list = false;  // some hundred measurements instead of a table
+};
+SourceKind KindOf(const Source& source);
+
+// The default model. Anisotropic materials get the half vector's place as a further input and a
+// larger network; lists a grid that is coarse enough for every corner to be supervised.
+ModelShape DefaultShape(const SourceKind& kind);
+
+// How corners come to their codes.
+enum class IndexTraining {
+  // Continuous features first, then k-means; codes and network go on with the indices as they are.
+  kClusters,
+  // The paper's (section 4): codes at random and a softmax over logits, straight-through, from the
+  // first step on.
+  kSoftmax,
+  // k-means, then straight-through from the distances to the codes.
+  kClustersThenSoftmax
+};
+
 struct TrainOptions {
   uint64_t seed = 1;
   size_t pool = size_t{1} << 20;
   double half_angle_share = 0.5;
   int batch = 512;
-  int free_steps = 6000;      // with continuous features
+  int free_steps = 6000;      // with continuous features; kSoftmax: more of the others
   int codebook_steps = 6000;  // with codes
   float feature_rate = 0.02f;
   float network_rate = 0.006f;
+  IndexTraining index_training = IndexTraining::kClusters;
+  // How far features are drawn to the nearest code, sixteen times in the last two thirds of the
+  // free steps, rising to this share of the way: 0 none, 1 all of it.
+  float pull = 1;
+  float logit_rate = 0.01f;     // of kSoftmax
   float codebook_rate = 0.01f;  // of the codes
   float codebook_network_rate = 0.003f;
+  // Of features, codes and weights, per step and rate (AdamW). Keeps what the data leaves open
+  // small, and with it the speckle of neighbouring corners.
+  float decay = 0.1f;
   const CancelToken* cancel = nullptr;
 };
+
+// The default training. Lists get a strong decay, which makes them smooth between measurements.
+TrainOptions DefaultTraining(const SourceKind& kind);
 
 struct CurvePoint {
   double samples = 0;
   double wall_s = 0;
-  double log1p_mae = 0;  // mean |log1p(f) - log1p(f*)| of held-out samples, cosine-weighted f
+  // Mean |log1p(f) - log1p(f*)| of held-out samples, cosine-weighted f; of lists, which are too
+  // short to hold some back, of the measurements themselves.
+  double log1p_mae = 0;
 };
 
 struct TrainedBrdf {
@@ -65,5 +101,13 @@ struct TrainedBrdf {
 Result<TrainedBrdf> TrainBrdf(const Source& source, const ModelShape& shape,
                               const TrainOptions& options, ThreadPool& pool,
                               ProgressSink& progress);
+
+// Trains several materials of one kind on one codebook and one network, each with a grid of its
+// own: NeuBRDF, section 3.3. The results stand in the order of the sources; their codebooks and
+// networks are equal, and losses and the curve are those of all together. Steps grow with the
+// number of materials.
+Result<std::vector<TrainedBrdf>> TrainShared(std::span<const Source* const> sources,
+                                             const ModelShape& shape, const TrainOptions& options,
+                                             ThreadPool& pool, ProgressSink& progress);
 
 }  // namespace patina::brdf

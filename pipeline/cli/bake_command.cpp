@@ -1,5 +1,7 @@
 #include <cstdio>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <set>
 
 #include "formats/base/file_io.h"
@@ -7,6 +9,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/result_text.h"
 #include "pipeline/jobs/brdf_files.h"
+#include "pipeline/jobs/brdf_run.h"
 #include "pipeline/jobs/event_log.h"
 #include "pipeline/jobs/job_runner.h"
 #include "pipeline/jobs/job_sets.h"
@@ -18,6 +21,7 @@ namespace {
 struct Planned {
   std::string asset;
   Result<Job> job;
+  bool may_share = false;  // a BRDF whose shape no job file has set
 };
 
 template <class Enum, class Parse>
@@ -110,7 +114,7 @@ void PlanFolder(const std::string& folder, const BakeOptions& options, Verbosity
       continue;
     }
     if (!asset.file.empty()) {
-      plan->push_back({asset.asset, BrdfJob(asset.asset, asset.file)});
+      plan->push_back({asset.asset, BrdfJob(asset.asset, asset.file), true});
       continue;
     }
     Job job;
@@ -128,7 +132,7 @@ std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
     if (std::filesystem::is_regular_file(input, ignored)) {
       if (IsBrdfInput(input)) {
         const std::string asset = BrdfAssetName(input);
-        plan.push_back({asset, BrdfJob(asset, input)});
+        plan.push_back({asset, BrdfJob(asset, input), true});
         continue;
       }
       auto job = ReadJobFile(input);
@@ -199,6 +203,28 @@ void Print(const JobResult& result, const CommandLine& line) {
   std::fflush(stdout);
 }
 
+// Runs the BRDFs of a plan that may share codebooks.
+void RunShared(const std::vector<Planned>& plan, int share, Verbosity verbosity,
+               const CancelToken& cancel, std::vector<std::optional<JobResult>>* results) {
+  std::vector<Job> jobs;
+  std::vector<size_t> place;
+  for (size_t i = 0; i < plan.size(); ++i) {
+    if (!plan[i].may_share || !plan[i].job) continue;
+    jobs.push_back(*plan[i].job);
+    place.push_back(i);
+  }
+  std::vector<std::unique_ptr<TerminalProgress>> terminals(jobs.size());
+  const auto observer = [&](size_t job) -> JobObserver& {
+    if (!terminals[job]) {
+      terminals[job] = std::make_unique<TerminalProgress>(stderr, verbosity, jobs[job].asset);
+    }
+    return *terminals[job];
+  };
+  std::vector<JobResult> done =
+      RunSharedBrdfJobs(jobs, static_cast<size_t>(share), observer, cancel);
+  for (size_t job = 0; job < done.size(); ++job) (*results)[place[job]] = std::move(done[job]);
+}
+
 // Beside the events, unless they go to a pipe or a device; else beside the job.
 std::string DefaultResultPath(const RunOptions& options) {
   std::error_code ignored;
@@ -217,11 +243,17 @@ int BakeCommand(const CommandLine& line, const CancelToken& cancel) {
     return kExitUsage;
   }
   const std::vector<Planned> plan = Plan(options, line.verbosity);
+  std::vector<std::optional<JobResult>> shared(plan.size());
+  if (options.share > 1) RunShared(plan, options.share, line.verbosity, cancel, &shared);
   std::vector<JobResult> results;
   int worst = kExitDone;
-  for (const Planned& planned : plan) {
-    if (cancel.cancelled() && !results.empty()) break;
-    if (planned.job) {
+  for (size_t i = 0; i < plan.size(); ++i) {
+    const Planned& planned = plan[i];
+    if (shared[i]) {
+      results.push_back(std::move(*shared[i]));
+    } else if (cancel.cancelled() && i > 0) {
+      break;
+    } else if (planned.job) {
       TerminalProgress progress(stderr, line.verbosity, planned.asset);
       results.push_back(RunJob(*planned.job, progress, cancel));
     } else {

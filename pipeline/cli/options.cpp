@@ -122,6 +122,12 @@ void AddBake(CLI::App* app, CommandLine* line) {
   AddOverride(command, "--recipe", &o.job.recipe,
               "How to train: ours (default), or as the papers do (Weinreich 2024, Dou 2023)")
       ->check(CLI::IsMember({"patina", "paper"}));
+  command
+      ->add_option("--share", o.share,
+                   "[BRDFs] Train up to N BRDF files that look alike on one codebook: smaller "
+                   "containers, a little less exact (default 1: each its own)")
+      ->check(CLI::Range(1, 64))
+      ->type_name("N");
   AddOverride(command, "--samples", &o.job.samples,
               "[maps] Train with exactly so many samples, in place of --quality's choice")
       ->check(FiniteRange(0.0, 1e12))

@@ -32,6 +32,7 @@ struct JobOverrides {
 struct BakeOptions {
   std::vector<std::string> inputs;  // folders, BRDF files, job files
   std::string map_list;             // --maps FILE.json, or empty
+  int share = 1;                    // BRDFs on one codebook
   JobOverrides job;
 };
 

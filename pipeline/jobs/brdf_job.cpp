@@ -25,8 +25,8 @@ const char* InterpolationName(Interpolation interpolation) {
   return "bilinear";
 }
 
-brdf::ModelShape ModelOfJob(const Job& job) {
-  brdf::ModelShape shape;
+brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind) {
+  brdf::ModelShape shape = brdf::DefaultShape(kind);
   if (job.recipe == Recipe::kPaper) {
     shape.grid.nside = 64;
     shape.hidden = 64;
@@ -41,6 +41,7 @@ brdf::ModelShape ModelOfJob(const Job& job) {
   Override(model.hidden_layers, &shape.hidden_layers);
   Override(model.angle_inputs, &shape.grid.angle_inputs);
   Override(model.canonical_order, &shape.grid.canonical_order);
+  if (!shape.grid.angle_inputs) shape.grid.half_vector_inputs = false;
   for (const Interpolation interpolation : kInterpolations) {
     if (model.interpolation == InterpolationName(interpolation))
       shape.grid.interpolation = interpolation;
@@ -48,13 +49,13 @@ brdf::ModelShape ModelOfJob(const Job& job) {
   return shape;
 }
 
-brdf::TrainOptions TrainingOfJob(const Job& job) {
-  brdf::TrainOptions options;
+brdf::TrainOptions TrainingOfJob(const Job& job, const brdf::SourceKind& kind) {
+  brdf::TrainOptions options = brdf::DefaultTraining(kind);
   options.seed = job.seed;
   switch (job.quality) {
     case Quality::kPreview:
-      options.free_steps = 3000;
-      options.codebook_steps = 1500;
+      options.free_steps /= 2;
+      options.codebook_steps /= 4;
       break;
     case Quality::kStandard:
       break;

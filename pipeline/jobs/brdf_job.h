@@ -22,11 +22,10 @@ inline constexpr int kMaxJobHiddenLayers = 4;
 const char* InterpolationName(Interpolation interpolation);  // as in job files and manifests
 
 // The model's shape: the recipe's, with what the job says in its place. Recipe::kPaper is the plain
-// model: Nside 64, 64 hidden units, neither angle inputs nor canonical order. Whether the material
-// is isotropic is the source's to say.
-brdf::ModelShape ModelOfJob(const Job& job);
+// model: Nside 64, 64 hidden units, neither angle inputs nor canonical order.
+brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind);
 
 // Steps by quality: fewer for preview, three times those of standard for reference.
-brdf::TrainOptions TrainingOfJob(const Job& job);
+brdf::TrainOptions TrainingOfJob(const Job& job, const brdf::SourceKind& kind);
 
 }  // namespace patina

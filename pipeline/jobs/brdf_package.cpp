@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "formats/base/file_io.h"
 #include "formats/base/sha256.h"
 #include "formats/brdf_sampler.h"
 #include "formats/index_pack.h"
@@ -70,6 +71,7 @@ Json ModelJson(const ManifestBrdf& model) {
           {"isotropic", model.isotropic},
           {"canonical_order", model.canonical_order},
           {"angle_inputs", model.angle_inputs},
+          {"half_vector_inputs", model.half_vector_inputs},
           {"layers", model.layers}};
 }
 
@@ -92,15 +94,37 @@ Result<BrdfSource> ReadBrdfSource(const Job& job) {
   return source;
 }
 
-std::string BrdfFingerprint(const Job& job, const std::string& sha256) {
+std::string BrdfFingerprint(const Job& job, const std::string& sha256,
+                            const std::vector<std::string>& group) {
   Sha256 hash;
   hash.Update("patina brdf\nrecipe " + std::to_string(kBrdfRecipeVersion) + "\njob " +
               CanonicalJob(job) + "\nfile " + sha256 + "\n");
+  for (const std::string& member : group) hash.Update("trained with " + member + "\n");
   return hash.FinishHex();
 }
 
-Status AddBrdfModel(const brdf::TrainedBrdf& model, StagingArea* staging) {
-  auto grid = EncodeIndexPack(model.pack);
+Result<SharedCodebook> WriteSharedCodebook(const brdf::TrainedBrdf& model,
+                                           const std::string& folder) {
+  auto bytes = EncodeCodebook({model.pack.primitive_size, model.pack.codebook});
+  if (!bytes) return Fail(ErrorCode::kInternal, "the shared codebook: " + bytes.error().message);
+  Sha256 hash;
+  hash.Update(*bytes);
+  SharedCodebook shared;
+  shared.sha256 = hash.FinishHex();
+  shared.file = "codebook-" + shared.sha256.substr(0, 16) + ".hpc";
+  PATINA_TRY(WriteFileDurably(folder + "/" + shared.file, *bytes));
+  return shared;
+}
+
+Status AddBrdfModel(const brdf::TrainedBrdf& model, const SharedCodebook& shared,
+                    StagingArea* staging) {
+  IndexPack pack = model.pack;
+  if (!shared.file.empty()) {
+    pack.codebook.clear();
+    pack.codebook_file = shared.file;
+    pack.codebook_sha256 = shared.sha256;
+  }
+  auto grid = EncodeIndexPack(pack);
   if (!grid) return AsInternal(Fail(grid.error(), kGridName));
   PATINA_TRY(staging->AddPayload(kGridName, "grid", *grid));
   auto weights = EncodeWeights(model.network);
@@ -124,7 +148,8 @@ Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model) {
   return {};
 }
 
-Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape) {
+Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape,
+                      const SharedCodebook& shared) {
   Manifest manifest;
   manifest.kind = JobKindName(JobKind::kBrdf);
   manifest.asset = job.asset;
@@ -141,6 +166,8 @@ Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::Mode
   model.invalid_cells = source.data.invalid_cells;
   model.files.push_back({ManifestPath(FileName(job.file)), source.sha256});
   model.grid = kGridName;
+  model.shared_codebook_file = shared.file;
+  model.shared_codebook_sha256 = shared.sha256;
   model.nside = shape.grid.nside;
   model.primitive_size = shape.primitive_size;
   model.index_bits = shape.index_bits;
@@ -148,6 +175,7 @@ Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::Mode
   model.isotropic = shape.grid.isotropic;
   model.canonical_order = shape.grid.canonical_order;
   model.angle_inputs = shape.grid.angle_inputs;
+  model.half_vector_inputs = shape.grid.half_vector_inputs;
   model.network = kWeightsName;
   model.layers.push_back(2 * shape.primitive_size + shape.grid.extra_inputs());
   model.layers.insert(model.layers.end(), static_cast<size_t>(shape.hidden_layers), shape.hidden);

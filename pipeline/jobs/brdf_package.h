@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "formats/base/result.h"
 #include "formats/brdf/brdf_source.h"
@@ -23,13 +24,26 @@ struct BrdfSource {
 // Errors: those of OpenBrdf; kConflict when the file changed while it was read.
 Result<BrdfSource> ReadBrdfSource(const Job& job);
 
-// SHA-256 of what decides the bytes of the container: recipe version, canonical job and the file's
-// hash.
-std::string BrdfFingerprint(const Job& job, const std::string& sha256);
+// Where the codebook of a model lies if it is shared; both empty if it is not.
+struct SharedCodebook {
+  std::string file;  // beside the assets
+  std::string sha256;
+};
+
+// SHA-256 of what decides the bytes of the container: recipe version, canonical job, the file's
+// hash, and those of the files that are trained together with it.
+std::string BrdfFingerprint(const Job& job, const std::string& sha256,
+                            const std::vector<std::string>& group = {});
+
+// Writes the codebook of a model to `folder`, under a name that its bytes decide. Errors: those of
+// WriteFileDurably; kInternal.
+Result<SharedCodebook> WriteSharedCodebook(const brdf::TrainedBrdf& model,
+                                           const std::string& folder);
 
 // Adds grid.hpx and decoder.weights. Errors: those of StagingArea::AddPayload; kInternal in place
 // of kInvalidArgument, since what was trained must be writable.
-Status AddBrdfModel(const brdf::TrainedBrdf& model, StagingArea* staging);
+Status AddBrdfModel(const brdf::TrainedBrdf& model, const SharedCodebook& shared,
+                    StagingArea* staging);
 
 // Fits sampler.bin to what the staged files decode to, adds it and names it in the manifest, which
 // must stand beside the payloads already. Errors: those of the decoder, EncodeBrdfSampler and
@@ -37,7 +51,8 @@ Status AddBrdfModel(const brdf::TrainedBrdf& model, StagingArea* staging);
 Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model);
 
 // The manifest of a container, without its quality.
-Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape);
+Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape,
+                      const SharedCodebook& shared);
 
 void DescribeBrdfQuality(const BrdfMeasurement& measurement, ManifestBrdf* model);
 

@@ -69,7 +69,9 @@ std::string BrdfText(const Manifest& m) {
   }
   text += Format("  grid Nside %d, primitives of %d, %d index bits, %s%s%s\n", brdf.nside,
                  brdf.primitive_size, brdf.index_bits, brdf.interpolation.c_str(),
-                 brdf.angle_inputs ? ", angle inputs" : "",
+                 brdf.half_vector_inputs ? ", angle and half vector inputs"
+                 : brdf.angle_inputs     ? ", angle inputs"
+                                         : "",
                  brdf.canonical_order ? ", canonical order" : "");
   if (!brdf.shared_codebook_file.empty())
     text += "  codebook shared with other assets: " + brdf.shared_codebook_file + "\n";

@@ -346,15 +346,20 @@ std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
 }
 
 std::string CanonicalBrdfJob(const Job& job, nlohmann::ordered_json json) {
-  const brdf::ModelShape shape = ModelOfJob(job);
-  json["model"] = {{"nside", shape.grid.nside},
-                   {"primitive_size", shape.primitive_size},
-                   {"index_bits", shape.index_bits},
-                   {"hidden", shape.hidden},
-                   {"hidden_layers", shape.hidden_layers},
-                   {"interpolation", InterpolationName(shape.grid.interpolation)},
-                   {"angle_inputs", shape.grid.angle_inputs},
-                   {"canonical_order", shape.grid.canonical_order}};
+  // Which of them it will be is the source's to say, whose hash stands beside this.
+  for (const brdf::SourceKind kind :
+       {brdf::SourceKind{true, false}, brdf::SourceKind{true, true}, brdf::SourceKind{false, false},
+        brdf::SourceKind{false, true}}) {
+    const brdf::ModelShape shape = ModelOfJob(job, kind);
+    json["models"].push_back({{"nside", shape.grid.nside},
+                              {"primitive_size", shape.primitive_size},
+                              {"index_bits", shape.index_bits},
+                              {"hidden", shape.hidden},
+                              {"hidden_layers", shape.hidden_layers},
+                              {"interpolation", InterpolationName(shape.grid.interpolation)},
+                              {"angle_inputs", shape.grid.angle_inputs},
+                              {"canonical_order", shape.grid.canonical_order}});
+  }
   json["quality"] = QualityName(job.quality);
   json["recipe"] = RecipeName(job.recipe);
   json["seed"] = job.seed;

@@ -94,15 +94,15 @@ struct Row {
 };
 
 constexpr Row kRows[] = {
-    {"default: Nside 32, 32 x 2, bilinear", 32, 32, 2, true, healpix::Interpolation::kBilinear},
-    {"inverse distance", 32, 32, 2, true, healpix::Interpolation::kInverseDistance},
-    {"uniform", 32, 32, 2, true, healpix::Interpolation::kUniform},
-    {"16 x 2", 32, 16, 2, true, healpix::Interpolation::kBilinear},
-    {"64 x 2", 32, 64, 2, true, healpix::Interpolation::kBilinear},
-    {"64 x 3", 32, 64, 3, true, healpix::Interpolation::kBilinear},
-    {"Nside 16", 16, 32, 2, true, healpix::Interpolation::kBilinear},
+    {"default: Nside 16, 32 x 2, bilinear", 16, 32, 2, true, healpix::Interpolation::kBilinear},
+    {"inverse distance", 16, 32, 2, true, healpix::Interpolation::kInverseDistance},
+    {"uniform", 16, 32, 2, true, healpix::Interpolation::kUniform},
+    {"16 x 2", 16, 16, 2, true, healpix::Interpolation::kBilinear},
+    {"64 x 2", 16, 64, 2, true, healpix::Interpolation::kBilinear},
+    {"64 x 3", 16, 64, 3, true, healpix::Interpolation::kBilinear},
+    {"Nside 32", 32, 32, 2, true, healpix::Interpolation::kBilinear},
     {"Nside 64", 64, 32, 2, true, healpix::Interpolation::kBilinear},
-    {"no scalar inputs", 32, 32, 2, false, healpix::Interpolation::kBilinear},
+    {"no scalar inputs", 16, 32, 2, false, healpix::Interpolation::kBilinear},
     {"the paper's: Nside 64, 64 x 2, plain", 64, 64, 2, false, healpix::Interpolation::kBilinear},
 };
 

@@ -19,6 +19,14 @@ struct Variant {
   void (*apply)(ModelShape* shape, TrainOptions* options);
 };
 
+// The paper's model: neither scalars nor order.
+void Plain(int nside, ModelShape* shape, TrainOptions* options) {
+  shape->grid.angle_inputs = shape->grid.half_vector_inputs = shape->grid.canonical_order = false;
+  shape->grid.nside = nside;
+  shape->hidden = 64;
+  options->decay = 0;
+}
+
 const Variant kVariants[] = {
     {"default", [](ModelShape*, TrainOptions*) {}},
     {"reference",
@@ -27,7 +35,13 @@ const Variant kVariants[] = {
      }},
     {"8-bit", [](ModelShape* shape, TrainOptions*) { shape->index_bits = 8; }},
     {"k8", [](ModelShape* shape, TrainOptions*) { shape->primitive_size = 8; }},
-    {"nside16", [](ModelShape* shape, TrainOptions*) { shape->grid.nside = 16; }},
+    // More codes than an isotropic grid of Nside 16 has corners: features as good as continuous.
+    {"continuous",
+     [](ModelShape* shape, TrainOptions* options) { shape->index_bits = 12, options->pull = 0; }},
+    {"no-pull", [](ModelShape*, TrainOptions* options) { options->pull = 0; }},
+    {"no-decay", [](ModelShape*, TrainOptions* options) { options->decay = 0; }},
+    {"nside8", [](ModelShape* shape, TrainOptions*) { shape->grid.nside = 8; }},
+    {"nside32", [](ModelShape* shape, TrainOptions*) { shape->grid.nside = 32; }},
     {"nside64", [](ModelShape* shape, TrainOptions*) { shape->grid.nside = 64; }},
     {"64x3",
      [](ModelShape* shape, TrainOptions*) { shape->hidden = 64, shape->hidden_layers = 3; }},
@@ -40,11 +54,24 @@ const Variant kVariants[] = {
        shape->grid.interpolation = healpix::Interpolation::kUniform;
      }},
     {"no-order", [](ModelShape* shape, TrainOptions*) { shape->grid.canonical_order = false; }},
-    {"no-scalars", [](ModelShape* shape, TrainOptions*) { shape->grid.angle_inputs = false; }},
-    {"plain",
+    {"no-scalars",
      [](ModelShape* shape, TrainOptions*) {
-       shape->grid.angle_inputs = shape->grid.canonical_order = false;
-       shape->grid.nside = 64, shape->hidden = 64;
+       shape->grid.angle_inputs = shape->grid.half_vector_inputs = false;
+     }},
+    {"no-half-vector",
+     [](ModelShape* shape, TrainOptions*) { shape->grid.half_vector_inputs = false; }},
+    {"plain", [](ModelShape* shape, TrainOptions* options) { Plain(64, shape, options); }},
+    {"plain-nside16", [](ModelShape* shape, TrainOptions* options) { Plain(16, shape, options); }},
+    {"plain-no-pull",
+     [](ModelShape* shape, TrainOptions* options) {
+       Plain(64, shape, options);
+       options->pull = 0;
+     }},
+    {"plain-softmax",
+     [](ModelShape* shape, TrainOptions* options) {
+       Plain(64, shape, options);
+       options->index_training = brdf::IndexTraining::kSoftmax;
+       options->logit_rate = 0.05f;
      }},
 };
 
@@ -67,9 +94,8 @@ std::vector<std::string> VariantNames() {
 
 Result<FittedSystem> FitVariant(const std::string& name, const Material& material, uint64_t seed,
                                 ThreadPool& pool) {
-  ModelShape shape;
-  shape.grid.isotropic = material.source.isotropic;
-  TrainOptions options;
+  ModelShape shape = brdf::DefaultShape(brdf::KindOf(material.source));
+  TrainOptions options = brdf::DefaultTraining(brdf::KindOf(material.source));
   options.seed = seed;
   for (const Variant& variant : kVariants) {
     if (name == variant.name) variant.apply(&shape, &options);

@@ -49,11 +49,18 @@ class SlowDecoder {
     if (pack_.canonical_order && wo[2] > wi[2]) std::swap(wi, wo);
     double angles[3];
     AngleInputs(wi, wo, angles);
+    double half[2], length = 0;
+    for (int d = 0; d < 3; ++d) length += (wi[d] + wo[d]) * (wi[d] + wo[d]);
+    for (int d = 0; d < 2; ++d) {
+      const double h = (wi[d] + wo[d]) / std::sqrt(length);
+      half[d] = std::copysign(std::log(1 + 200 * std::abs(h)) / std::log(201.0), h);
+    }
     if (pack_.isotropic) healpix::FoldIsotropic(wi, wo);
     std::vector<double> x = Feature(0, wi);
     const std::vector<double> second = Feature(1, wo);
     x.insert(x.end(), second.begin(), second.end());
     if (pack_.angle_inputs) x.insert(x.end(), angles, angles + 3);
+    if (pack_.half_vector_inputs) x.insert(x.end(), half, half + 2);
     // A direction of single precision places a point in its pixel to about 1e-6 Nside; l has a
     // slope of 70 at the normal, where theta_h is known to 1e-7; q hangs on a difference that
     // cancels, and is checked away from there.
@@ -167,6 +174,7 @@ TEST(BrdfDecoder, AgreesWithAnEvaluationInDoublePrecision) {
     options.pack.isotropic = variant % 2 == 0;
     options.pack.canonical_order = variant / 2 % 2 == 0;
     options.pack.angle_inputs = variant % 5 != 0;
+    options.pack.half_vector_inputs = options.pack.angle_inputs && variant % 5 != 1;
     options.pack.stored = variant % 4 == 0 ? 1.0 : 0.6;
     options.hidden.assign(static_cast<size_t>(variant % 4), 8 + variant);
     options.shared_codebook = variant % 7 == 3;

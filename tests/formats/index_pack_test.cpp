@@ -50,6 +50,7 @@ void ExpectSame(const IndexPack& a, const IndexPack& b) {
   EXPECT_EQ(a.isotropic, b.isotropic);
   EXPECT_EQ(a.canonical_order, b.canonical_order);
   EXPECT_EQ(a.angle_inputs, b.angle_inputs);
+  EXPECT_EQ(a.half_vector_inputs, b.half_vector_inputs);
   for (int h = 0; h < 2; ++h) EXPECT_EQ(a.stored[h], b.stored[h]);
   EXPECT_EQ(a.indices, b.indices);
   EXPECT_EQ(a.codebook, b.codebook);
@@ -72,6 +73,7 @@ TEST(IndexPack, RoundTripsEveryFeature) {
         pack.isotropic = random.Below(2) != 0;
         pack.canonical_order = random.Below(2) != 0;
         pack.angle_inputs = random.Below(2) != 0;
+        pack.half_vector_inputs = pack.angle_inputs && random.Below(2) != 0;
         for (const int level : {0, 3, 19}) {
           const auto bytes = EncodeIndexPack(pack, level);
           ASSERT_OK(bytes);

@@ -307,6 +307,12 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRulesOfBrdfs) {
       {"/brdf/network/layers", [](Manifest* m) { m->brdf->layers = {35}; }},
       {"/brdf/network/layers", [](Manifest* m) { m->brdf->layers.assign(18, 3); }},
       {"/brdf/network/layers", [](Manifest* m) { m->brdf->angle_inputs = false; }},
+      {"/brdf/network/layers", [](Manifest* m) { m->brdf->half_vector_inputs = true; }},
+      {"/brdf/half_vector_inputs",
+       [](Manifest* m) {
+         m->brdf->angle_inputs = false;
+         m->brdf->half_vector_inputs = true;
+       }},
       {"/brdf/network/layers", [](Manifest* m) { m->brdf->layers.back() = 4; }},
       {"/brdf/network/layers/1", [](Manifest* m) { m->brdf->layers[1] = 513; }},
       {"/brdf/network/activation", [](Manifest* m) { m->brdf->activation = "gelu"; }},

@@ -31,6 +31,7 @@ struct PackOptions {
   bool isotropic = false;
   bool canonical_order = false;
   bool angle_inputs = true;
+  bool half_vector_inputs = false;
   double stored = 0.6;  // share of stored corners
 };
 
@@ -43,6 +44,7 @@ inline IndexPack RandomPack(Random& random, const PackOptions& options = {}) {
   pack.isotropic = options.isotropic;
   pack.canonical_order = options.canonical_order;
   pack.angle_inputs = options.angle_inputs;
+  pack.half_vector_inputs = options.half_vector_inputs;
   for (auto& stored : pack.stored) {
     stored.resize(static_cast<size_t>(healpix::CornerCount(pack.nside)));
     for (uint8_t& value : stored) {
@@ -157,7 +159,9 @@ inline Result<StagingArea> StageBrdfSample(const std::string& out, const std::st
   brdf.isotropic = pack.isotropic;
   brdf.canonical_order = pack.canonical_order;
   brdf.angle_inputs = pack.angle_inputs;
-  brdf.layers = {2 * pack.primitive_size + (pack.angle_inputs ? 3 : 0)};
+  brdf.half_vector_inputs = pack.half_vector_inputs;
+  brdf.layers = {2 * pack.primitive_size + (pack.angle_inputs ? 3 : 0) +
+                 (pack.half_vector_inputs ? 2 : 0)};
   brdf.layers.insert(brdf.layers.end(), options.hidden.begin(), options.hidden.end());
   brdf.layers.push_back(3);
   PATINA_ASSIGN(const auto weights, EncodeWeights(RandomLayers(random, brdf.layers)));

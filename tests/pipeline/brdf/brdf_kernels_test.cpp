@@ -20,7 +20,7 @@ struct Shape {
 };
 
 constexpr Shape kShapes[] = {
-    {16, 3, 32, 2}, {16, 0, 64, 3}, {8, 3, 24, 1}, {20, 3, 16, 2}, {1, 0, 4, 1}};
+    {16, 3, 32, 2}, {16, 0, 64, 3}, {8, 3, 24, 1}, {20, 5, 16, 2}, {1, 0, 4, 1}};
 constexpr int kCorners = 40;
 
 // A network, features and a chunk of samples from a seed.

@@ -58,6 +58,23 @@ TEST(AngleInputs, KnowAnglesByTheirDefinition) {
   EXPECT_NEAR(out[2], 1.0, 1e-5);
 }
 
+TEST(HalfVectorInputs, FollowTheHalfVector) {
+  const double tilt = 0.3, turn = 2;
+  const double x = std::sin(tilt) * std::cos(turn), y = std::sin(tilt) * std::sin(turn);
+  // Both directions along h, then on either side of it.
+  const Direction h = At(tilt, turn);
+  float out[2], other[2];
+  HalfVectorInputs(h, h, out);
+  EXPECT_NEAR(out[0], -std::log(1 - 200 * x) / std::log(201.0), 1e-5);
+  EXPECT_NEAR(out[1], std::log(1 + 200 * y) / std::log(201.0), 1e-5);
+  HalfVectorInputs(At(tilt - 0.2, turn), At(tilt + 0.2, turn), other);
+  for (int d = 0; d < 2; ++d) EXPECT_NEAR(other[d], out[d], 1e-5);
+  HalfVectorInputs({0, 0, 1}, {0, 0, 1}, out);
+  for (const float v : out) EXPECT_EQ(v, 0.0f);
+  HalfVectorInputs({1, 0, 0}, {-1, 0, 0}, out);  // no half vector
+  for (const float v : out) EXPECT_TRUE(std::isfinite(v));
+}
+
 TEST(SamplePool, IsotropicLookupsDoNotChangeWhenThePairTurns) {
   GridShape shape;
   Rng rng(3);
@@ -88,14 +105,19 @@ TEST(SamplePool, TheKernelsLookUpPairsAsTheScalarCodeDoes) {
   for (const SimdTarget target : {SimdTarget::kAvx2, SimdTarget::kAvx512}) {
     if (!SimdTargetSupported(target)) continue;
     for (const int nside : {1, 2, 3, 8, 32, 64}) {
-      for (const int flags : {0, 1, 2, 4, 7}) {
+      for (const int flags : {0, 1, 2, 4, 7, 12, 14}) {
         GridShape shape;
         shape.nside = nside;
         shape.isotropic = (flags & 1) != 0;
         shape.canonical_order = (flags & 2) != 0;
         shape.angle_inputs = (flags & 4) != 0;
-        const LookUpGrid grid = {nside, shape.corners(), shape.isotropic, shape.canonical_order,
-                                 shape.angle_inputs};
+        shape.half_vector_inputs = (flags & 8) != 0;
+        const LookUpGrid grid = {nside,
+                                 shape.corners(),
+                                 shape.isotropic,
+                                 shape.canonical_order,
+                                 shape.angle_inputs,
+                                 shape.half_vector_inputs};
         std::vector<Direction> wi, wo;
         Rng rng(static_cast<uint64_t>(nside));
         for (int n = 0; n < 1000; ++n) {
@@ -136,9 +158,8 @@ TEST(SamplePool, TheKernelsLookUpPairsAsTheScalarCodeDoes) {
               EXPECT_NEAR(sum[0][d], sum[1][d], 5e-6)
                   << nside << " " << flags << " " << s << " " << side;
           }
-          if (shape.angle_inputs) {
-            for (int e = 0; e < 3; ++e) EXPECT_NEAR(samples[s].extra[e], wanted.extra[e], 2e-5f);
-          }
+          for (int e = 0; e < shape.extra_inputs(); ++e)
+            EXPECT_NEAR(samples[s].extra[e], wanted.extra[e], 2e-5f) << e;
         }
       }
     }

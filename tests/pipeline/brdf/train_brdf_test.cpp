@@ -114,13 +114,80 @@ TEST(TrainBrdf, LearnsABrushedMaterialByItsAzimuth) {
         return true;
       },
       false);
-  ModelShape shape = Small();
-  shape.grid.isotropic = false;
-  shape.index_bits = 9;
+  const ModelShape shape = DefaultShape(KindOf(source));
+  EXPECT_TRUE(shape.grid.half_vector_inputs);
   TrainOptions options = Quick();
   options.free_steps = 3000;
   const ImageError error = SphereError(source, MustTrain(source, shape, options, 2));
   EXPECT_GT(error.ssim, 0.97);
+}
+
+// Lobes ten times as wide along x as along y, and narrow: without the half vector's place as an
+// input the image is another one (SSIM below 0.8).
+TEST(TrainBrdf, LearnsALobeThatIsNarrowInOneDirection) {
+  const Source source = SourceOf(
+      [](const Direction& wi, const Direction& wo, float* rgb) {
+        const float hx = wi.x + wo.x, hy = wi.y + wo.y, hz = wi.z + wo.z;
+        const float e = (hx * hx / 0.04f + hy * hy / 0.0004f) / (hz * hz);
+        rgb[0] = rgb[1] = rgb[2] = 0.05f + 20 * std::exp(-e);
+        return true;
+      },
+      false);
+  TrainOptions options = DefaultTraining(KindOf(source));
+  options.pool = 200000;
+  options.free_steps = 2000;
+  options.codebook_steps = 1000;
+  const ImageError error =
+      SphereError(source, MustTrain(source, DefaultShape(KindOf(source)), options, 2));
+  EXPECT_GT(error.ssim, 0.95);
+}
+
+// 448 measurements: more would fit the corners of a fine grid one by one, and show them.
+TEST(TrainBrdf, AListOfSomeHundredMeasurementsBecomesSmooth) {
+  const Source table = PlasticSource(0.15f);
+  Source list;
+  Rng rng(7);
+  while (list.samples.size() < 448) {
+    Sample sample;
+    DrawPair(list.samples.size() % 2 ? Draw::kHalfAngles : Draw::kDirections, &rng, &sample.wi,
+             &sample.wo);
+    if (!table.table->Evaluate(sample.wi, sample.wo, sample.rgb)) continue;
+    list.samples.push_back(sample);
+  }
+  const SourceKind kind = KindOf(list);
+  EXPECT_TRUE(kind.list);
+  const TrainedBrdf trained = MustTrain(list, DefaultShape(kind), DefaultTraining(kind), 2);
+  EXPECT_GT(SphereError(table, trained).ssim, 0.98);
+  EXPECT_LT(trained.pack.codebook.size(), 242u * 16) << "codes that no corner uses are left out";
+}
+
+TEST(TrainBrdf, CodesCostLittleWhereFeaturesAreDrawnToThem) {
+  // The plain model: far fewer codes than corners, and nothing but the corners tells directions.
+  const Source source = PlasticSource(0.15f);
+  ModelShape shape = Small();
+  shape.grid.nside = 32;
+  shape.grid.angle_inputs = false;
+  TrainOptions options = Quick();
+  options.decay = 0;
+  const double with = MustTrain(source, shape, options, 2).final_loss;
+  options.pull = 0;
+  const double without = MustTrain(source, shape, options, 2).final_loss;
+  EXPECT_LT(with, 0.9 * without);
+}
+
+TEST(TrainBrdf, EveryWayToIndicesLearns) {
+  const Source source = PlasticSource(0.15f);
+  ModelShape shape = Small();
+  shape.grid.nside = 8;
+  for (const IndexTraining way :
+       {IndexTraining::kClusters, IndexTraining::kSoftmax, IndexTraining::kClustersThenSoftmax}) {
+    TrainOptions options = Quick();
+    options.index_training = way;
+    const TrainedBrdf trained = MustTrain(source, shape, options, 2);
+    EXPECT_GT(SphereError(source, trained).ssim, 0.97) << static_cast<int>(way);
+    const TrainedBrdf again = MustTrain(source, shape, options, 3);
+    EXPECT_EQ(trained.pack.indices, again.pack.indices) << static_cast<int>(way);
+  }
 }
 
 TEST(TrainBrdf, EveryRuleAndShapeTrainsAndEvaluatesFinite) {

@@ -84,13 +84,13 @@ TEST(ParseJob, ReadsTheMinimalBrdfWithTheRecipesModel) {
   EXPECT_EQ(job->file, Example("chrome.binary"));
   EXPECT_EQ(job->out, Example("baked"));
   const brdf::ModelShape defaults;
-  const brdf::ModelShape shape = ModelOfJob(*job);
+  const brdf::ModelShape shape = ModelOfJob(*job, {});
   EXPECT_EQ(shape.grid.nside, defaults.grid.nside);
   EXPECT_EQ(shape.hidden, defaults.hidden);
   EXPECT_TRUE(shape.grid.angle_inputs);
   EXPECT_TRUE(shape.grid.canonical_order);
   job->recipe = Recipe::kPaper;
-  const brdf::ModelShape plain = ModelOfJob(*job);
+  const brdf::ModelShape plain = ModelOfJob(*job, {});
   EXPECT_EQ(plain.grid.nside, 64);
   EXPECT_EQ(plain.hidden, 64);
   EXPECT_FALSE(plain.grid.angle_inputs);
@@ -100,7 +100,7 @@ TEST(ParseJob, ReadsTheMinimalBrdfWithTheRecipesModel) {
 TEST(ParseJob, ReadsEveryFieldOfTheFullBrdf) {
   auto job = ReadJobFile(Example("job_brdf_full.json"));
   ASSERT_TRUE(job) << job.error().message;
-  const brdf::ModelShape shape = ModelOfJob(*job);
+  const brdf::ModelShape shape = ModelOfJob(*job, {});
   EXPECT_EQ(shape.grid.nside, 48);
   EXPECT_EQ(shape.primitive_size, 24);
   EXPECT_EQ(shape.index_bits, 10);
@@ -418,7 +418,7 @@ TEST(CanonicalJob, NamesTheModelOfABrdf) {
   b.file = "elsewhere.binary";
   b.out = "other";
   b.threads = 3;
-  b.model.nside = ModelOfJob(a).grid.nside;  // what it would be anyway
+  b.model.nside = ModelOfJob(a, {}).grid.nside;  // what it would be anyway
   EXPECT_EQ(CanonicalJob(a), CanonicalJob(b));
   for (auto change :
        {+[](Job* j) { j->seed = 2; }, +[](Job* j) { j->quality = Quality::kPreview; },
