@@ -2,6 +2,7 @@
 #include "pipeline/cli/options.h"
 
 #include <CLI/CLI.hpp>
+#include <limits>
 #include <sstream>
 
 #include "pipeline/jobs/job.h"
@@ -169,6 +170,21 @@ void AddRun(CLI::App* app, CommandLine* line) {
           "--result", line->run.result,
           "Where to write the result (default: result.json beside the events, or beside the job)")
       ->type_name("FILE");
+  RunGuards& guards = line->run.guards;
+  command->add_flag("--skip-unchanged", guards.skip_unchanged,
+                    "Bake nothing if the asset's current container is of the same fingerprint");
+  command
+      ->add_option("--not-revision", guards.not_revision,
+                   "With --skip-unchanged: bake all the same if that is this revision")
+      ->type_name("REVISION");
+  auto* fence = command
+                    ->add_option("--fence", guards.fence_file,
+                                 "Publish only while this file names the attempt")
+                    ->type_name("FILE");
+  command->add_option("--attempt", guards.attempt, "Number of the attempt, for --fence")
+      ->check(CLI::Range(int64_t{1}, std::numeric_limits<int64_t>::max()))
+      ->type_name("N")
+      ->needs(fence);
   AddCommon(command, line, true);
   command->footer(
       "The result file is written last and at once, on success and on failure. Example:\n"

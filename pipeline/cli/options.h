@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/cli/terminal_progress.h"
+#include "pipeline/jobs/run_guards.h"
 
 namespace patina {
 
@@ -37,6 +38,7 @@ struct BakeOptions {
 
 struct RunOptions {
   std::string job_file;
+  RunGuards guards;
   std::string events;  // empty: none
   std::string result;  // empty: result.json beside the events, or beside the job
 };

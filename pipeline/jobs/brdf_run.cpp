@@ -29,6 +29,7 @@ class BrdfRun : public StagedRun {
  private:
   Status RunStages() override {
     PATINA_TRY(Stage("ingest", [this] { return Ingest(); }));
+    if (FoundUnchanged()) return {};
     PATINA_TRY(Stage("train", [this] { return Train(); }));
     PATINA_TRY(Stage("package", [this] { return Package(); }));
     PATINA_TRY(Stage("verify", [this] { return Verify(); }));
@@ -149,8 +150,9 @@ class BrdfRun : public StagedRun {
 
 }  // namespace
 
-JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel) {
-  return BrdfRun(job, observer, cancel).Run();
+JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                     const RunGuards& guards) {
+  return BrdfRun(job, observer, cancel, guards).Run();
 }
 
 }  // namespace patina
