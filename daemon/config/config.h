@@ -71,9 +71,10 @@ struct RetentionConfig {
 enum class SandboxMode { kOff, kAuto, kRequire };
 
 struct Config {
-  std::string file;       // where it was read from; empty: no file
-  std::string state_dir;  // absolute: queue, jobs, lock, socket
-  std::string out;        // absolute: containers
+  std::string file;        // where it was read from; empty: no file
+  std::string state_dir;   // absolute: queue, jobs, lock, socket
+  std::string out;         // absolute: containers
+  std::string failed_dir;  // absolute: for <asset>.failed.json; empty: beside the asset
   std::vector<WatchConfig> watch;
   JobDefaults job;
   // Folders that jobs of the API may read from and write to besides the watched ones and `out`.
@@ -93,10 +94,9 @@ struct Config {
 
 // What flags and environment say; absent: nothing.
 struct ConfigOverrides {
-  std::optional<std::string> state_dir, out, socket, listen, token_file, worker, log_level,
-      log_format;
+  std::optional<std::string> state_dir, out, failed_dir, socket, listen, token_file, worker,
+      log_level, cores, log_format;
   std::vector<std::string> watch;  // instead of the file's list
-  std::optional<int> cores;
 };
 
 // One thing that is wrong with a configuration.
@@ -119,7 +119,8 @@ LoadedConfig LoadConfig(const std::string& file, const std::vector<std::string>&
 // The configuration in effect, as a configuration file.
 std::string ConfigToJson(const Config& config);
 
-// What may be changed by a reload: all but state_dir, out, watch, api and worker. Returns the names
+// What may be changed by a reload: all but state_dir, out, watch, api, worker, nice and
+// sandbox. Returns the names
 // of the others that differ.
 std::vector<std::string> RestartOnlyChanges(const Config& before, const Config& after);
 

@@ -169,6 +169,7 @@ class SqliteJobStore : public JobStore {
     }
     PATINA_TRY(database_->Run(insert));
     const int64_t id = database_->LastInsertId();
+    PATINA_TRY(NoteLastJob(id, job, now_ms));
     PATINA_TRY(AddEvent(id, "submitted", now_ms,
                         Json{{"asset", job.asset},
                              {"state", "queued"},
@@ -330,8 +331,10 @@ class SqliteJobStore : public JobStore {
     PATINA_ASSIGN(Transaction transaction, Transaction::Begin(*database_));
     PATINA_ASSIGN(const JobRecord job, Load(attempt.job));
     if (job.attempt != attempt.attempt || job.state != JobState::kRunning) return Stale(attempt);
-    PATINA_TRY(CheckTransition(job, end.state));
     const bool lost = end.state == JobState::kRetryWaiting || end.state == JobState::kBuried;
+    const bool cancelled = job.cancel_requested && (lost || end.state == JobState::kQueued);
+    const JobState state = cancelled ? JobState::kCancelled : end.state;
+    PATINA_TRY(CheckTransition(job, state));
     PATINA_ASSIGN(
         Statement update,
         database_->Prepare(
@@ -339,22 +342,22 @@ class SqliteJobStore : public JobStore {
             "lease_ms = 0, handle = '', cancel_requested = 0, failures = failures + ?6, "
             "error_code = ?7, error_message = ?8, result = ?9, revision = ?10, container = ?11, "
             "memory_mb = ?12 WHERE id = ?1"));
-    update.Bind(attempt.job).Bind(static_cast<int64_t>(end.state)).Bind(now_ms);
-    update.Bind(IsFinal(end.state) ? now_ms : 0);
-    update.Bind(end.state == JobState::kRetryWaiting ? end.due_ms : 0).Bind(lost ? 1 : 0);
+    update.Bind(attempt.job).Bind(static_cast<int64_t>(state)).Bind(now_ms);
+    update.Bind(IsFinal(state) ? now_ms : 0);
+    update.Bind(state == JobState::kRetryWaiting ? end.due_ms : 0).Bind(lost ? 1 : 0);
     update.Bind(end.error_code).Bind(end.error_message).Bind(end.result_json);
     update.Bind(end.revision).Bind(end.container);
     update.Bind(end.memory_mb > 0 ? end.memory_mb : job.limits.memory_mb);
     PATINA_TRY(database_->Run(update));
     Json data{
-        {"asset", job.asset}, {"state", JobStateName(end.state)}, {"attempt", attempt.attempt}};
+        {"asset", job.asset}, {"state", JobStateName(state)}, {"attempt", attempt.attempt}};
     if (end.exit_code >= 0) data["exit_code"] = end.exit_code;
     if (end.signal > 0) data["signal"] = end.signal;
     if (!end.error_code.empty()) data["error"] = end.error_code;
     if (!end.error_message.empty()) data["message"] = end.error_message;
     if (!end.revision.empty()) data["revision"] = end.revision;
-    if (end.state == JobState::kRetryWaiting) data["due_ms"] = end.due_ms;
-    const char* type = end.state == JobState::kQueued ? "requeued" : JobStateName(end.state);
+    if (state == JobState::kRetryWaiting) data["due_ms"] = end.due_ms;
+    const char* type = state == JobState::kQueued ? "requeued" : JobStateName(state);
     PATINA_TRY(AddEvent(attempt.job, type, now_ms, data));
     return transaction.Commit();
   }
@@ -487,15 +490,17 @@ class SqliteJobStore : public JobStore {
     return LoadPaused();
   }
 
-  Status ReplaceWaiting(int64_t id, const std::string& job_json, const std::string& signature,
-                        int64_t now_ms) override {
+  Status ReplaceWaiting(int64_t id, const NewJob& job, int64_t now_ms) override {
     const std::lock_guard lock(mutex_);
+    PATINA_ASSIGN(Transaction transaction, Transaction::Begin(*database_));
     PATINA_ASSIGN(Statement update,
                   database_->Prepare("UPDATE jobs SET job = ?2, signature = ?3, updated_ms = ?4 "
                                      "WHERE id = ?1 AND state IN (1, 6)"));
-    PATINA_TRY(database_->Run(update.Bind(id).Bind(job_json).Bind(signature).Bind(now_ms)));
-    if (database_->ChangedRows() == 1) return {};
-    return Fail(ErrorCode::kConflict, "job " + std::to_string(id) + " does not wait any more");
+    PATINA_TRY(database_->Run(update.Bind(id).Bind(job.job_json).Bind(job.signature).Bind(now_ms)));
+    if (database_->ChangedRows() != 1)
+      return Fail(ErrorCode::kConflict, "job " + std::to_string(id) + " does not wait any more");
+    PATINA_TRY(NoteLastJob(id, job, now_ms));
+    return transaction.Commit();
   }
 
   Result<std::vector<StoredEvent>> EventsAfter(int64_t id, int limit) override {
@@ -611,6 +616,23 @@ class SqliteJobStore : public JobStore {
                   database_->Prepare("SELECT value FROM settings WHERE name = 'paused'"));
     PATINA_ASSIGN(const bool row, query.Step());
     return row && query.Text(0) == "1";
+  }
+
+  // What the API knows of an asset does not replace what the watcher knows.
+  Status NoteLastJob(int64_t id, const NewJob& job, int64_t now_ms) {
+    PATINA_ASSIGN(
+        Statement put,
+        database_->Prepare(
+            job.origin == JobOrigin::kWatch
+                ? "INSERT INTO assets (out, name, source, signature, failed_file, last_job, "
+                  "updated_ms, gone) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 0) ON CONFLICT (name, "
+                  "out) DO UPDATE SET source = ?3, signature = ?4, failed_file = ?5, last_job = "
+                  "?6, updated_ms = ?7, gone = 0"
+                : "INSERT INTO assets (out, name, source, signature, failed_file, last_job, "
+                  "updated_ms, gone) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, 0) ON CONFLICT (name, "
+                  "out) DO UPDATE SET last_job = ?6, updated_ms = ?7"));
+    put.Bind(job.out).Bind(job.asset).Bind(job.source).Bind(job.signature).Bind(job.failed_file);
+    return database_->Run(put.Bind(id).Bind(now_ms));
   }
 
   // For statements with an id and a time.

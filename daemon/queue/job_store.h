@@ -42,8 +42,10 @@ struct NewJob {
   bool force = false;           // bake even if nothing changed
   std::string job_json;         // the job file, with absolute paths
   std::string idempotency_key;  // empty: none
-  // Of kWatch: what the job was made for; see AssetRecord::signature.
+  // The asset's, as in AssetRecord; of kWatch all three, of kApi the first.
+  std::string source;
   std::string signature;
+  std::string failed_file;
 };
 
 // One job. `job_json` and `result_json` are left empty by List.
@@ -129,10 +131,11 @@ struct StoredEvent {
 struct AssetRecord {
   std::string name;
   std::string out;
-  std::string source;     // folder or file; empty: came by the API
-  std::string signature;  // of the source when it was last taken notice of: names, sizes, times and
-                          // recipe versions, as the watcher writes it
-  std::string failed_file;  // <asset>.failed.json that lies beside the source; empty: none
+  std::string source;  // folder or file; empty: came by the API
+  // Of what was last baked or tried: the source's files as the watcher saw them, the job and the
+  // recipe's version. Empty: came by the API.
+  std::string signature;
+  std::string failed_file;  // where it is put in writing that it failed; empty: nowhere
   int64_t last_job = 0;
   int64_t updated_ms = 0;
   bool gone = false;  // the source has disappeared; the containers stay
@@ -158,7 +161,8 @@ class JobStore {
   static Result<std::unique_ptr<JobStore>> Open(const std::string& path);
   virtual ~JobStore() = default;
 
-  // kConflict: the idempotency key was used for another request.
+  // Also notes it as the last job of its asset. kConflict: the idempotency key was used for another
+  // request.
   virtual Result<Submitted> Submit(const NewJob& job, int64_t now_ms) = 0;
 
   virtual Result<JobRecord> Get(int64_t id) = 0;  // kNotFound
@@ -180,6 +184,7 @@ class JobStore {
                                   int64_t now_ms) = 0;
   virtual Status SetHandle(const AttemptKey& attempt, const std::string& handle) = 0;
   virtual Status Heartbeat(const std::vector<AttemptKey>& attempts, int64_t lease_ms) = 0;
+  // A job that is to be cancelled becomes kCancelled in place of kRetryWaiting, kBuried or kQueued.
   virtual Status Finish(const AttemptKey& attempt, const AttemptEnd& end, int64_t now_ms) = 0;
   // A waiting job is cancelled at once; a running one is marked and its new state is kRunning.
   virtual Result<JobState> Cancel(int64_t id, int64_t now_ms) = 0;
@@ -195,9 +200,9 @@ class JobStore {
   virtual Status SetPriority(int64_t id, int priority, int64_t now_ms) = 0;
   virtual Status SetQueuePaused(bool paused, int64_t now_ms) = 0;
   virtual Result<bool> QueuePaused() = 0;
-  // Gives a waiting job a newer description of the same asset.
-  virtual Status ReplaceWaiting(int64_t id, const std::string& job_json,
-                                const std::string& signature, int64_t now_ms) = 0;
+  // Gives a waiting job and its asset a newer description of the same. kConflict: it no longer
+  // waits.
+  virtual Status ReplaceWaiting(int64_t id, const NewJob& job, int64_t now_ms) = 0;
 
   // Oldest first.
   virtual Result<std::vector<StoredEvent>> EventsAfter(int64_t id, int limit) = 0;
