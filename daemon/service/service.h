@@ -98,7 +98,7 @@ struct WatchedRoot {
   std::string path;
   std::string mode;         // "inotify" or "polling"
   std::string mode_reason;  // "ext4", "nfs: changes by others are not announced" ...
-  int64_t folders = 0, files = 0;
+  int64_t folders = 0, assets = 0;
 };
 
 struct WatchHealth {
@@ -107,7 +107,6 @@ struct WatchHealth {
   std::string cure;     // what to do about it
   std::vector<WatchedRoot> roots;
   int64_t events = 0, overflows = 0, rescans = 0;
-  int64_t last_rescan_ms = 0;
 };
 
 // What the service asks of a watcher. Thread-safe.

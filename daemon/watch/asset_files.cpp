@@ -12,7 +12,7 @@
 #include "formats/base/file_io.h"
 #include "formats/base/sha256.h"
 #include "formats/brdf/brdf_source.h"
-#include "pipeline/image/map_finder.h"
+#include "pipeline/image/map_name.h"
 
 namespace patina::daemon {
 namespace {

@@ -1,7 +1,6 @@
 #include "pipeline/image/map_finder.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -33,12 +32,6 @@ struct Claim {
   int rank = 0;
   bool borrowed = false;  // from a group of another stem
 };
-
-std::string LowerExtension(const std::string& file) {
-  std::string extension = fs::path(file).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
 
 // Lossless and deep formats first: of two files with the same size and depth the first is used.
 int FormatOrder(const std::string& file) {
@@ -505,12 +498,6 @@ const char* MapNoteKindName(MapNote::Kind kind) {
       return "ignored";
   }
   return "found";
-}
-
-bool HasImageExtension(const std::string& file_name) {
-  static const std::set<std::string> known = {".png",  ".jpg", ".jpeg", ".tga", ".tif",
-                                              ".tiff", ".exr", ".hdr",  ".dds"};
-  return known.count(LowerExtension(file_name)) != 0;
 }
 
 Result<std::vector<MapSet>> FindMaps(const std::string& folder) {

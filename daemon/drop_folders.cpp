@@ -1,0 +1,167 @@
+#include "daemon/drop_folders.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <mutex>
+#include <vector>
+
+#include "daemon/base/clock.h"
+#include "daemon/watch/watcher.h"
+
+namespace patina::daemon {
+namespace {
+
+std::string ParentOf(const std::string& path) {
+  return std::filesystem::path(path).parent_path().string();
+}
+
+class WatchedFolders : public DropFolders, public AssetSource {
+ public:
+  WatchedFolders(Service& service, Logger& log) : service_(service), log_(log) {}
+
+  ~WatchedFolders() override {
+    // Status calls end here; then the watchers, whose handlers may still call the service.
+    service_.AttachSource(nullptr);
+    const std::lock_guard lock(mutex_);
+    watchers_.clear();
+  }
+
+  Status Open(const Config& config) {
+    for (const WatchConfig& watch : config.watch) {
+      WatchOptions options;
+      options.root = watch.path;
+      options.exclude = {config.out, config.state_dir};
+      options.exclude.insert(options.exclude.end(), config.output_roots.begin(),
+                             config.output_roots.end());
+      if (!config.failed_dir.empty()) options.exclude.push_back(config.failed_dir);
+      options.mode = watch.mode;
+      options.settle_ms = watch.settle_ms;
+      options.poll_ms = watch.poll_ms;
+      options.rescan_s = watch.rescan_s;
+      WatchHandlers handlers;
+      handlers.on_ready = [this, root = watch.path](const ReadyAsset& asset) {
+        return Offer(root, asset);
+      };
+      handlers.on_gone = [this](const ReadyAsset& asset) { Withdraw(asset.name); };
+      handlers.on_scanned = [this, root = watch.path] { WithdrawMissing(root); };
+      PATINA_ASSIGN(std::unique_ptr<Watcher> watcher, Watcher::Start(options, std::move(handlers)));
+      const std::lock_guard lock(mutex_);
+      watchers_.push_back(std::move(watcher));
+    }
+    service_.AttachSource(this);
+    return {};
+  }
+
+  WatchHealth Health() const override {
+    const std::lock_guard lock(mutex_);
+    WatchHealth health;
+    for (const auto& watcher : watchers_) {
+      const WatchStatus status = watcher->status();
+      WatchedRoot root;
+      root.path = status.root;
+      root.mode = status.mode;
+      root.mode_reason = status.mode_reason;
+      root.folders = status.folders;
+      root.assets = status.assets;
+      health.roots.push_back(std::move(root));
+      health.events += static_cast<int64_t>(status.events);
+      health.overflows += static_cast<int64_t>(status.overflows);
+      health.rescans += static_cast<int64_t>(status.rescans);
+      for (const WatchProblem& problem : status.problems) {
+        health.healthy = false;
+        health.reason += (health.reason.empty() ? "" : "; ") + problem.reason;
+        health.cure += (health.cure.empty() ? "" : "; ") + problem.cure;
+      }
+    }
+    return health;
+  }
+
+  std::vector<PendingAsset> Pending() const override {
+    const std::lock_guard lock(mutex_);
+    std::vector<PendingAsset> pending;
+    for (const auto& watcher : watchers_) {
+      for (const WatchedAsset& asset : watcher->assets()) {
+        if (asset.state != AssetState::kReady)
+          pending.push_back({asset.name, asset.path, asset.reason, 0});
+      }
+    }
+    std::sort(pending.begin(), pending.end(),
+              [](const PendingAsset& a, const PendingAsset& b) { return a.name < b.name; });
+    return pending;
+  }
+
+  void RequestRescan() override {
+    const std::lock_guard lock(mutex_);
+    for (const auto& watcher : watchers_) watcher->RequestRescan();
+  }
+
+ private:
+  Status Offer(const std::string& root, const ReadyAsset& asset) {
+    AssetOffer offer;
+    offer.job.asset = asset.name;
+    if (asset.is_file) {
+      offer.job.kind = JobKind::kBrdf;
+      offer.job.file = asset.path;
+    } else {
+      offer.job.folder = asset.path;
+    }
+    offer.signature = asset.token;
+    offer.failed_folder = asset.path == root ? root : ParentOf(asset.path);
+    auto outcome = service_.OfferAsset(offer);
+    if (!outcome) {
+      log_.Warning(
+          "asset_refused",
+          {{"asset", asset.name}, {"path", asset.path}, {"reason", outcome.error().message}});
+      return Fail(outcome.error());
+    }
+    log_.Info("asset_ready", {{"asset", asset.name},
+                              {"path", asset.path},
+                              {"files", asset.files},
+                              {"unchanged", *outcome == OfferOutcome::kUnchanged}});
+    return {};
+  }
+
+  void Withdraw(const std::string& name) {
+    const Status withdrawn = service_.WithdrawAsset(name);
+    if (!withdrawn)
+      log_.Warning("asset_not_withdrawn", {{"asset", name}, {"reason", withdrawn.error().message}});
+  }
+
+  // What was removed while no daemon ran.
+  void WithdrawMissing(const std::string& root) {
+    constexpr int kPage = 1000;
+    std::string after;
+    for (;;) {
+      auto assets = service_.Assets(after, kPage);
+      if (!assets || assets->empty()) return;
+      for (const AssetView& asset : *assets) {
+        struct stat info;
+        if (asset.state != "gone" && asset.source.size() > root.size() &&
+            asset.source.compare(0, root.size() + 1, root + "/") == 0 &&
+            ::lstat(asset.source.c_str(), &info) != 0 && errno == ENOENT) {
+          Withdraw(asset.name);
+        }
+      }
+      if (assets->size() < kPage) return;
+      after = assets->back().name;
+    }
+  }
+
+  Service& service_;
+  Logger& log_;
+  mutable std::mutex mutex_;
+  std::vector<std::unique_ptr<Watcher>> watchers_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<DropFolders>> DropFolders::Start(const Config& config, Service& service,
+                                                        Logger& log) {
+  auto folders = std::make_unique<WatchedFolders>(service, log);
+  PATINA_TRY(folders->Open(config));
+  return folders;
+}
+
+}  // namespace patina::daemon
