@@ -10,6 +10,7 @@
 #include <memory>
 #include <random>
 
+#include "daemon/api/api_server.h"
 #include "daemon/base/clock.h"
 #include "daemon/base/log.h"
 #include "daemon/base/service_manager.h"
@@ -130,6 +131,8 @@ class Daemon {
     if (!config_.watch.empty()) {
       PATINA_ASSIGN(folders_, DropFolders::Start(config_, *service_, log_));
     }
+    PATINA_ASSIGN(api_, ApiServer::Start(config_.api, config_.out, service_.get(),
+                                         folders_ ? folders_->source() : nullptr, &log_));
     return {};
   }
 
@@ -157,7 +160,7 @@ class Daemon {
         stopping = true;
         log_.Info("stopping", {{"grace_s", config_.stop_grace_s}});
         NotifyServiceManager("STOPPING=1");
-        folders_.reset();
+        // Drop folders and API go on, for those who ask; the service takes nothing from them.
         service_->BeginStop();
       }
     }
@@ -202,6 +205,7 @@ class Daemon {
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<DaemonService> service_;
   std::unique_ptr<DropFolders> folders_;
+  std::unique_ptr<ApiServer> api_;
 };
 
 }  // namespace

@@ -54,6 +54,8 @@ class WatchedFolders : public DropFolders, public AssetSource {
     return {};
   }
 
+  AssetSource* source() override { return this; }
+
   WatchHealth Health() const override {
     const std::lock_guard lock(mutex_);
     WatchHealth health;
@@ -111,6 +113,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
     offer.failed_folder = asset.path == root ? root : ParentOf(asset.path);
     auto outcome = service_.OfferAsset(offer);
     if (!outcome) {
+      if (outcome.error().code == ErrorCode::kCancelled) return Fail(outcome.error());
       log_.Warning(
           "asset_refused",
           {{"asset", asset.name}, {"path", asset.path}, {"reason", outcome.error().message}});

@@ -17,6 +17,7 @@ class DropFolders {
   static Result<std::unique_ptr<DropFolders>> Start(const Config& config, Service& service,
                                                     Logger& log);
   virtual ~DropFolders() = default;
+  virtual AssetSource* source() = 0;
 };
 
 }  // namespace patina::daemon
