@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/cli/terminal_progress.h"
+#include "pipeline/client/client_commands.h"
 #include "pipeline/jobs/run_guards.h"
 
 namespace patina {
@@ -74,7 +75,23 @@ struct SampleOptions {
   uint64_t seed = 1;
 };
 
-enum class Command { kBake, kRun, kUnpack, kInfo, kCompare, kEval, kSample };
+enum class Command {
+  kBake,
+  kRun,
+  kUnpack,
+  kInfo,
+  kCompare,
+  kEval,
+  kSample,
+  // Of a daemon's client.
+  kSubmit,
+  kJobs,
+  kWatch,
+  kCancel,
+  kRetry,
+  kLogs,
+  kStatus
+};
 
 struct CommandLine {
   Command command = Command::kBake;
@@ -85,6 +102,7 @@ struct CommandLine {
   CompareOptions compare;
   EvalOptions eval;
   SampleOptions sample;
+  ClientOptions client;
   bool json = false;
   Verbosity verbosity = Verbosity::kNormal;
   std::string simd;  // empty: what the environment says, or the best
