@@ -12,6 +12,7 @@
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "formats/base/check.h"
@@ -94,14 +95,24 @@ pid_t PidOfStaging(std::string_view name) {
                                                                                            : 0;
 }
 
+// A zombie is dead as well: where nobody reaps orphans, as in many a container, it stays for ever.
+bool IsDead(pid_t pid) {
+  if (::kill(pid, 0) != 0) return errno == ESRCH;
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string line;
+  std::getline(stat, line);
+  // "pid (name) state ..."; the name may hold anything.
+  const size_t end = line.rfind(") ");
+  return end != std::string::npos && line.compare(end, 3, ") Z") == 0;
+}
+
 // Call with the lock held: then no staging area of this process is alive either.
 void RemoveDeadStaging(const std::string& asset_directory) {
   std::vector<fs::path> dead;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(asset_directory, ignored)) {
     const pid_t pid = PidOfStaging(entry.path().filename().string());
-    if (pid != 0 && (pid == ::getpid() || (::kill(pid, 0) != 0 && errno == ESRCH)))
-      dead.push_back(entry.path());
+    if (pid != 0 && (pid == ::getpid() || IsDead(pid))) dead.push_back(entry.path());
   }
   for (const fs::path& path : dead) fs::remove_all(path, ignored);
 }

@@ -139,11 +139,14 @@ Status Scheduler::Recover() {
     const auto job = parts_.store.Get(id);
     if (!job && job.error().code == ErrorCode::kNotFound) folders_.Remove(id);
   }
-  // A crash may have come between the end of a job and its failed file.
+  // A crash may have come between the end of a job and what follows from it.
   std::string after;
   for (;;) {
     PATINA_ASSIGN(const std::vector<AssetRecord> assets, parts_.store.Assets(after, 1000));
-    for (const AssetRecord& asset : assets) SettleFailedFile(asset.last_job, true);
+    for (const AssetRecord& asset : assets) {
+      SettleFailedFile(asset.last_job, true);
+      PruneAsset(asset.out, asset.name);
+    }
     if (assets.size() < 1000) break;
     after = assets.back().name;
   }
@@ -366,18 +369,23 @@ void Scheduler::AfterEnd(const Active& active, const AttemptOutcome& outcome) {
   folders_.NoteInLog(job.id, note);
   SettleFailedFile(job.id, false);
   if (!IsFinal(end.state)) return;
-  auto pruned = PruneRevisions(job.out, job.asset, config()->retention.revisions);
-  if (pruned) {
-    parts_.board.Count([&](ServiceMetrics& m) { m.revisions_pruned += *pruned; });
-  } else if (pruned.error().code != ErrorCode::kNotFound) {
-    parts_.log.Warning("prune_failed", {{"asset", job.asset}, {"reason", pruned.error().message}});
-  }
+  PruneAsset(job.out, job.asset);
   // The sandbox keeps a job from removing the folder of an asset that it did not make. ENOTEMPTY
   // is the usual case.
   if (end.state != JobState::kSucceeded &&
       CurrentRevision(parts_.files, job.out, job.asset).empty()) {
     parts_.files.RemoveFile(job.out + "/" + job.asset + "/.lock");
     parts_.files.RemoveDirectory(job.out + "/" + job.asset);
+  }
+}
+
+void Scheduler::PruneAsset(const std::string& out, const std::string& asset) {
+  auto pruned = PruneRevisions(out, asset, config()->retention.revisions);
+  if (pruned) {
+    parts_.board.Count([&](ServiceMetrics& m) { m.revisions_pruned += *pruned; });
+  } else if (pruned.error().code != ErrorCode::kNotFound &&
+             pruned.error().code != ErrorCode::kConflict) {
+    parts_.log.Warning("prune_failed", {{"asset", asset}, {"reason", pruned.error().message}});
   }
 }
 

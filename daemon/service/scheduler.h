@@ -96,6 +96,8 @@ class Scheduler {
   // False: the store could not take it.
   bool WriteEnd(Active* active);
   void AfterEnd(const Active& active, const AttemptOutcome& outcome);
+  // Old revisions, and what dead bakes left. A bake that runs meanwhile is left alone.
+  void PruneAsset(const std::string& out, const std::string& asset);
   void SettleFailedFile(int64_t job, bool only_missing);
   void BeginStop(Active* active, StopReason reason);
   int CoresUsed() const;

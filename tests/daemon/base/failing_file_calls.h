@@ -80,8 +80,13 @@ class FailingFileCalls : public FileCalls {
     return Call([&] { return real_.RemoveTree(path); });
   }
 
+ protected:
+  // Before each counted call.
+  virtual void OnCall() {}
+
  private:
   int Next() {
+    OnCall();
     const int call = calls_++;
     const int fail_at = fail_at_;
     if (fail_at < 0 || call < fail_at || (call > fail_at && !and_all_after_)) return 0;
