@@ -381,8 +381,9 @@ void AddClientCommands(CLI::App* app, CommandLine* line) {
   watch->footer(
       "With an ID the exit code is that of the job, as of `patina bake`. --json prints each event "
       "on "
-      "a line.\n"
-      "Example:\n  patina watch 12");
+      "a line, and at\n"
+      "last the job. Example:\n"
+      "  patina watch 12");
 
   CLI::App* cancel = AddClient(app, line, Command::kCancel, "cancel", "Cancel jobs");
   AddIds(cancel, line, kMany, "The jobs")->required();

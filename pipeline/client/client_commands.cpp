@@ -98,24 +98,26 @@ class Session {
       const auto take = [&](const ServerEvent& event) {
         if (!event.id.empty()) last_id = event.id;
         heard = true;
-        lost = {};
         // Who names the last event misses nothing; who cannot has to look once it is heard again.
         if (event.type == kStreamOpened && !last_id.empty()) return true;
         auto more = on_event(event.type == kStreamOpened ? ServerEvent{"", "reset", "{}"} : event);
         if (!more) failed = Fail(more.error());
+        if (more) lost = {};
         return more && *more;
       };
       HttpHeaders headers;
       if (!last_id.empty()) headers.emplace_back("Last-Event-ID", last_id);
       const auto end = client_.Stream("/v1/events" + query, headers, take);
-      if (!failed) return failed;
-      if (end && *end == StreamEnd::kStopped) return {};
       if (cancel_.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
+      if (failed && end && *end == StreamEnd::kStopped) return {};
+      Status broken = failed ? (end ? Status() : Status(Fail(end.error()))) : failed;
+      // What was looked at on account of the last event is not known.
+      if (!failed) last_id.clear();
       // A daemon that was there may come back.
-      if (!end && (!heard || end.error().code != ErrorCode::kNotFound)) return Fail(end.error());
+      if (!broken && (!heard || !IsBreak(broken.error()))) return broken;
       const Clock::time_point now = Clock::now();
       if (lost == Clock::time_point{}) lost = now;
-      if (!end && now - lost > kReconnectFor) return Fail(end.error());
+      if (!broken && now - lost > kReconnectFor) return broken;
       std::this_thread::sleep_for(kReconnectPause);
     }
   }
@@ -123,6 +125,11 @@ class Session {
   bool cancelled() const { return cancel_.cancelled(); }
 
  private:
+  // Nobody listens, or the connection ended within an answer: what is seen of a daemon that ends.
+  static bool IsBreak(const Error& error) {
+    return error.code == ErrorCode::kNotFound || error.code == ErrorCode::kCorruptData;
+  }
+
   const ClientOptions& options_;
   const CancelToken& cancel_;
   HttpClient client_;
@@ -349,32 +356,27 @@ int WatchCommand(const ClientOptions& options, const CancelToken& cancel) {
   const int64_t id = options.ids.empty() ? 0 : options.ids[0];
   int code = kExitDone;
   LiveLine line(options.quiet);
-  const Status ended = session.Listen(id > 0 ? "?job=" + std::to_string(id) : "",
-                                      [&](const ServerEvent& event) -> Result<bool> {
-                                        const Json data = Json::parse(event.data, nullptr, false);
-                                        if (event.type != "reset") {
-                                          if (options.json) {
-                                            PrintJson(data);
-                                          } else if (event.type == "progress") {
-                                            line.Show(EventLine(data));
-                                          } else {
-                                            line.Clear();
-                                            std::printf("%s\n", EventLine(data).c_str());
-                                          }
-                                          if (std::fflush(stdout) != 0)
-                                            return false;  // the reader has gone
-                                        }
-                                        if (id == 0 || event.type == "progress") {
-                                          // Without an id it tells the daemon is there, or fails.
-                                          if (event.type == "reset")
-                                            PATINA_TRY(session.Ask("GET", "/healthz"));
-                                          return true;
-                                        }
-                                        PATINA_ASSIGN(const Json job, session.Job(id));
-                                        if (!IsFinalState(job.value("state", ""))) return true;
-                                        code = ExitCodeOfJob(job);
-                                        return false;
-                                      });
+  const auto on_event = [&](const ServerEvent& event) -> Result<bool> {
+    const Json data = Json::parse(event.data, nullptr, false);
+    if (event.type == "reset") {
+      if (id == 0) return true;
+    } else if (options.json) {
+      PrintJson(data);
+    } else if (event.type == "progress") {
+      line.Show(EventLine(data));
+    } else {
+      line.Clear();
+      std::printf("%s\n", EventLine(data).c_str());
+    }
+    if (std::fflush(stdout) != 0) return false;  // the reader has gone
+    if (id == 0 || event.type == "progress") return true;
+    PATINA_ASSIGN(const Json job, session.Job(id));
+    if (!IsFinalState(job.value("state", ""))) return true;
+    code = ExitCodeOfJob(job);
+    PrintJson(job);
+    return false;
+  };
+  const Status ended = session.Listen(id > 0 ? "?job=" + std::to_string(id) : "", on_event);
   if (ended) return code;
   // Somebody has seen enough.
   if (ended.error().code == ErrorCode::kCancelled) return kExitInterrupted;

@@ -73,6 +73,18 @@ void FakeService::Forget(int64_t id) {
   forgotten_ = id;
 }
 
+void FakeService::Add(int64_t id) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  jobs[id].record.id = id;
+  jobs[id].record.asset = "wall" + std::to_string(id);
+}
+
+void FakeService::Change(int64_t id, JobState state) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  jobs[id].record.state = state;
+  jobs[id].progress.reset();
+}
+
 void FakeService::Close() {
   const std::lock_guard<std::mutex> lock(mutex_);
   closed_ = true;

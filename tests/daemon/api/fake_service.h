@@ -20,6 +20,8 @@ class FakeService : public Service {
   // Events up to this id are no longer kept.
   void Forget(int64_t id);
   void Close();
+  void Add(int64_t id);  // a queued job
+  void Change(int64_t id, JobState state);
   int subscribers() const;
 
   Result<Submitted> Submit(const SubmitRequest& request) override;
