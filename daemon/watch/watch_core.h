@@ -166,6 +166,7 @@ class WatchCore {
   std::string PathOf(const Unit& unit) const;
   std::string NameOf(const Unit& unit) const;
   std::string ReasonOf(const Unit& unit, int64_t now_ns) const;
+  static bool IsListed(const Unit& unit);
   void AddAsset(const Unit& unit, int64_t now_ns, std::vector<WatchedAsset>* assets) const;
   void AddProblems(WatchStatus* status) const;
   int64_t PollInterval() const;

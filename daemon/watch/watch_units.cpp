@@ -317,12 +317,15 @@ std::string WatchCore::ReasonOf(const Unit& unit, int64_t now_ns) const {
          " ago; it is taken up when nothing has changed for " + Seconds(settle_ns_);
 }
 
+bool WatchCore::IsListed(const Unit& unit) {
+  // What is not known to be an asset is listed while it may be one: when there is a file to bake.
+  if (unit.has_asset || unit.state == AssetState::kUnreadable) return true;
+  return unit.phase != Phase::kSettled && !unit.seen.token.empty();
+}
+
 void WatchCore::AddAsset(const Unit& unit, int64_t now_ns,
                          std::vector<WatchedAsset>* assets) const {
-  // What is not known to be one is listed once it may be: when there is a file to bake.
-  if (!unit.has_asset && unit.seen.token.empty() && unit.state != AssetState::kUnreadable) return;
-  if (!unit.has_asset && unit.phase == Phase::kSettled && unit.state != AssetState::kUnreadable)
-    return;
+  if (!IsListed(unit)) return;
   WatchedAsset asset;
   asset.path = PathOf(unit);
   asset.name = NameOf(unit);
@@ -396,9 +399,14 @@ WatchStatus WatchCore::status() const {
   status.scanning = scanning_;
   status.folders = folders;
   status.folders_polled = folders_polled_;
-  for (const WatchedAsset& asset : assets(0)) {
+  const auto count = [&status](const Unit& unit) {
+    if (!IsListed(unit)) return;
     ++status.assets;
-    if (asset.state != AssetState::kReady) ++status.assets_waiting;
+    if (unit.state != AssetState::kReady) ++status.assets_waiting;
+  };
+  for (const auto& [relative, folder] : folders_) {
+    count(folder.images);
+    for (const auto& [name, unit] : folder.files) count(unit);
   }
   status.events = events_seen_;
   status.overflows = overflows_;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <ctime>
 #include <mutex>
@@ -21,6 +22,7 @@ namespace patina::daemon {
 namespace {
 
 constexpr int64_t kNsPerSecond = 1000000000;
+constexpr std::chrono::milliseconds kStatusPatience{200};
 
 int64_t NowNs() {
   timespec now{};
@@ -59,23 +61,27 @@ class WatcherThread : public Watcher {
     }
     core_.emplace(options_, events_.get(), FileSystemKindAt);
     PATINA_TRY(core_->Open(NowNs()));
+    status_ = core_->status();
     thread_ = std::thread([this] { Run(); });
     return {};
   }
 
   WatchStatus status() const override {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    return core_->status();
+    // A look at a disk that does not answer must not keep whoever asks how we are.
+    const std::unique_lock<std::timed_mutex> lock(mutex_, kStatusPatience);
+    const std::lock_guard<std::mutex> status_lock(status_mutex_);
+    if (lock) status_ = core_->status();
+    return status_;
   }
 
   std::vector<WatchedAsset> assets() const override {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::lock_guard<std::timed_mutex> lock(mutex_);
     return core_->assets(NowNs());
   }
 
   void RequestRescan() override {
     {
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const std::lock_guard<std::timed_mutex> lock(mutex_);
       core_->RequestRescan(NowNs());
     }
     Wake();
@@ -94,7 +100,7 @@ class WatcherThread : public Watcher {
       bool scanned = false;
       WatchCore::Outcome outcome;
       {
-        const std::lock_guard<std::mutex> lock(mutex_);
+        const std::lock_guard<std::timed_mutex> lock(mutex_);
         events.clear();
         const bool lost = events_ && events_->Read(&events);
         const int64_t now_ns = NowNs();
@@ -117,7 +123,7 @@ class WatcherThread : public Watcher {
     for (const ReadyAsset& asset : outcome.ready) {
       if (stopping_) return;
       const Status status = handlers_.on_ready(asset);
-      const std::lock_guard<std::mutex> lock(mutex_);
+      const std::lock_guard<std::timed_mutex> lock(mutex_);
       core_->HandedOver(asset, status, NowNs());
     }
     if (scanned && !told_scanned_) {
@@ -146,7 +152,9 @@ class WatcherThread : public Watcher {
   WatchHandlers handlers_;
   UniqueFd timer_, wake_, epoll_;
   std::unique_ptr<FolderEvents> events_;
-  mutable std::mutex mutex_;  // over core_ and events_
+  mutable std::timed_mutex mutex_;   // over core_ and events_
+  mutable std::mutex status_mutex_;  // over status_, taken after mutex_
+  mutable WatchStatus status_;       // as it was when nobody was at work last
   std::optional<WatchCore> core_;
   std::atomic<bool> stopping_{false};
   bool told_scanned_ = false;

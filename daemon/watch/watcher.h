@@ -30,7 +30,8 @@ class Watcher {
   // Waits for the handler that runs.
   virtual ~Watcher() = default;
 
-  // These may be called from any thread.
+  // These may be called from any thread. status() does not wait for a disk: when the watcher looks
+  // at one that takes longer than 0.2 s, it is that of before.
   virtual WatchStatus status() const = 0;
   virtual std::vector<WatchedAsset> assets() const = 0;
   virtual void RequestRescan() = 0;
