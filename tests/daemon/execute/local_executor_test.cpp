@@ -152,6 +152,9 @@ TEST_F(LocalExecutorTest, IsNotDeadWhileAnythingOfItLives) {
 }
 
 TEST_F(LocalExecutorTest, LimitsMemory) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer's own memory is beyond any limit";
+#endif
   AttemptSpec spec = Prepare("memory 3000");
   spec.memory_mb = 200;
   Start(spec);

@@ -93,6 +93,16 @@ TEST(ParseCommandLine, ReadsTheOtherCommands) {
   EXPECT_EQ(run.command->run.job_file, "j.json");
   EXPECT_EQ(run.command->run.events, "e");
   EXPECT_EQ(run.command->run.result, "r");
+  EXPECT_FALSE(run.command->run.guards.skip_unchanged);
+  const ParsedCommandLine guarded = Parse({"run", "j.json", "--skip-unchanged", "--not-revision",
+                                           "r0001", "--fence", "f", "--attempt", "3"});
+  ASSERT_TRUE(guarded.command);
+  EXPECT_TRUE(guarded.command->run.guards.skip_unchanged);
+  EXPECT_EQ(guarded.command->run.guards.not_revision, "r0001");
+  EXPECT_EQ(guarded.command->run.guards.fence_file, "f");
+  EXPECT_EQ(guarded.command->run.guards.attempt, 3);
+  EXPECT_FALSE(Parse({"run", "j.json", "--attempt", "3"}).command);
+  EXPECT_FALSE(Parse({"run", "j.json", "--fence", "f", "--attempt", "0"}).command);
   const ParsedCommandLine unpack =
       Parse({"unpack", "c", "--out", "d", "--mip", "3", "--format", "exr"});
   ASSERT_TRUE(unpack.command);
