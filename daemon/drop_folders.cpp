@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <mutex>
+#include <set>
 #include <vector>
 
 #include "daemon/base/clock.h"
 #include "daemon/watch/watcher.h"
+#include "pipeline/image/map_groups.h"
 
 namespace patina::daemon {
 namespace {
@@ -44,7 +47,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
       handlers.on_ready = [this, root = watch.path](const ReadyAsset& asset) {
         return Offer(root, asset);
       };
-      handlers.on_gone = [this](const ReadyAsset& asset) { Withdraw(asset.name); };
+      handlers.on_gone = [this](const ReadyAsset& asset) { WithdrawAll(asset); };
       handlers.on_scanned = [this, root = watch.path] { WithdrawMissing(root); };
       PATINA_ASSIGN(std::unique_ptr<Watcher> watcher, Watcher::Start(options, std::move(handlers)));
       const std::lock_guard lock(mutex_);
@@ -100,30 +103,67 @@ class WatchedFolders : public DropFolders, public AssetSource {
   }
 
  private:
-  Status Offer(const std::string& root, const ReadyAsset& asset) {
+  // One offer for a file or a folder with one material; one for each material of a folder that
+  // holds several, named after folder and set.
+  static std::vector<AssetOffer> OffersOf(const std::string& root, const ReadyAsset& asset) {
     AssetOffer offer;
     offer.job.asset = asset.name;
+    offer.signature = asset.token;
+    offer.failed_folder = asset.path == root ? root : ParentOf(asset.path);
     if (asset.is_file) {
       offer.job.kind = JobKind::kBrdf;
       offer.job.file = asset.path;
-    } else {
-      offer.job.folder = asset.path;
+      return {offer};
     }
-    offer.signature = asset.token;
-    offer.failed_folder = asset.path == root ? root : ParentOf(asset.path);
-    auto outcome = service_.OfferAsset(offer);
-    if (!outcome) {
-      if (outcome.error().code == ErrorCode::kCancelled) return Fail(outcome.error());
-      log_.Warning(
-          "asset_refused",
-          {{"asset", asset.name}, {"path", asset.path}, {"reason", outcome.error().message}});
-      return Fail(outcome.error());
+    offer.job.folder = asset.path;
+    const auto sets = FindSetNames(asset.path);
+    // What is wrong with a folder the job says, for all to read.
+    if (!sets || sets->size() < 2) return {offer};
+    const std::string folder = std::filesystem::path(asset.path).filename().string();
+    std::vector<AssetOffer> offers;
+    for (const std::string& set : *sets) {
+      const bool prefixed = set.rfind(folder + "_", 0) == 0;
+      const std::string suffix = prefixed ? set.substr(folder.size()) : "_" + set;
+      offer.job.set = set;
+      offer.job.asset = AssetNameFromPath(asset.name + suffix);
+      offers.push_back(offer);
     }
-    log_.Info("asset_ready", {{"asset", asset.name},
-                              {"path", asset.path},
-                              {"files", asset.files},
-                              {"unchanged", *outcome == OfferOutcome::kUnchanged}});
+    return offers;
+  }
+
+  Status Offer(const std::string& root, const ReadyAsset& asset) {
+    std::set<std::string> names;
+    for (const AssetOffer& offer : OffersOf(root, asset)) {
+      const std::string& name = offer.job.asset;
+      names.insert(name);
+      auto outcome = service_.OfferAsset(offer);
+      if (!outcome) {
+        if (outcome.error().code == ErrorCode::kCancelled) return Fail(outcome.error());
+        log_.Warning("asset_refused",
+                     {{"asset", name}, {"path", asset.path}, {"reason", outcome.error().message}});
+        return Fail(outcome.error());
+      }
+      log_.Info("asset_ready", {{"asset", name},
+                                {"path", asset.path},
+                                {"files", asset.files},
+                                {"unchanged", *outcome == OfferOutcome::kUnchanged}});
+    }
+    // A folder may hold other materials than it did.
+    const std::lock_guard lock(offered_mutex_);
+    std::set<std::string>& before = offered_[asset.path];
+    for (const std::string& name : before) {
+      if (names.count(name) == 0) Withdraw(name);
+    }
+    before = std::move(names);
     return {};
+  }
+
+  void WithdrawAll(const ReadyAsset& asset) {
+    const std::lock_guard lock(offered_mutex_);
+    const auto found = offered_.find(asset.path);
+    if (found == offered_.end()) return Withdraw(asset.name);
+    for (const std::string& name : found->second) Withdraw(name);
+    offered_.erase(found);
   }
 
   void Withdraw(const std::string& name) {
@@ -156,6 +196,8 @@ class WatchedFolders : public DropFolders, public AssetSource {
   Logger& log_;
   mutable std::mutex mutex_;
   std::vector<std::unique_ptr<Watcher>> watchers_;
+  std::mutex offered_mutex_;
+  std::map<std::string, std::set<std::string>> offered_;  // path -> names of assets
 };
 
 }  // namespace

@@ -107,6 +107,21 @@ TEST_F(DaemonTest, BakesWhatIsDroppedAsTheCommandDoesAndOnlyOnce) {
   EXPECT_EQ(fs::read_symlink(folder_ / "out/floor/current"), "r0002");
 }
 
+TEST_F(DaemonTest, BakesEveryMaterialOfAFolder) {
+  Drop("set", 1);
+  for (const char* maps : {"basecolor", "normal_gl"}) {
+    const std::string stem = folder_ / "drop/set/";
+    fs::copy(stem + "mosaic_floor_" + maps + ".png", stem + "wall_" + maps + ".png");
+  }
+  auto daemon = Start();
+  Until(daemon.get(), [&] {
+    return fs::exists(folder_ / "out/set_mosaic_floor/current/manifest.json") &&
+           fs::exists(folder_ / "out/set_wall/current/manifest.json");
+  });
+  Stop(daemon.get());
+  EXPECT_FALSE(fs::exists(folder_ / "out/set"));
+}
+
 TEST_F(DaemonTest, ASecondOneOnTheSameStateRefusesAndSaysWhoHasIt) {
   auto daemon = Start();
   Until(daemon.get(), [&] { return Count(Log(), " ready ") == 1; });
