@@ -90,7 +90,8 @@ UnixListener::~UnixListener() {
   if (fd_) unlink(path_.c_str());
 }
 
-Result<TcpListener> OpenTcpListener(const std::string& host, int port) {
+Result<TcpListener> OpenTcpListener(const std::string& name, int port) {
+  const std::string host = name == "localhost" ? "127.0.0.1" : name;
   const std::string where = host + ":" + std::to_string(port);
   in_addr v4{};
   in6_addr v6{};

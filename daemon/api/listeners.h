@@ -35,9 +35,9 @@ struct TcpListener {
   int port = 0;
 };
 
-// Listens on a loopback address ("127.0.0.1", "::1"; port 0 takes any). A port that somebody else
-// has is an error: no port is shared. Errors: kInvalidArgument (not a loopback address), kConflict
-// (in use), kIo.
-Result<TcpListener> OpenTcpListener(const std::string& host, int port);
+// Listens on a loopback address ("127.0.0.1", "::1", "localhost" for the former; port 0 takes any).
+// A port that somebody else has is an error: no port is shared. Errors: kInvalidArgument (not a
+// loopback address), kConflict (in use), kIo.
+Result<TcpListener> OpenTcpListener(const std::string& name, int port);
 
 }  // namespace patina::daemon

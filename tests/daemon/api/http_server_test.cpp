@@ -311,6 +311,7 @@ TEST_F(HttpServerTest, SharesNoTcpPort) {
   const auto first = OpenTcpListener("127.0.0.1", 0);
   ASSERT_OK(first);
   EXPECT_EQ(OpenTcpListener("127.0.0.1", first->port).error().code, ErrorCode::kConflict);
+  ASSERT_OK(OpenTcpListener("localhost", 0));
   for (const char* host : {"0.0.0.0", "192.168.1.1", "::", "example.com", ""})
     EXPECT_EQ(OpenTcpListener(host, 0).error().code, ErrorCode::kInvalidArgument) << host;
 }
