@@ -12,6 +12,7 @@
 #include <charconv>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "formats/base/check.h"
@@ -94,14 +95,24 @@ pid_t PidOfStaging(std::string_view name) {
                                                                                            : 0;
 }
 
+// A zombie is dead as well: where nobody reaps orphans, as in many a container, it stays for ever.
+bool IsDead(pid_t pid) {
+  if (::kill(pid, 0) != 0) return errno == ESRCH;
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string line;
+  std::getline(stat, line);
+  // "pid (name) state ..."; the name may hold anything.
+  const size_t end = line.rfind(") ");
+  return end != std::string::npos && line.compare(end, 3, ") Z") == 0;
+}
+
 // Call with the lock held: then no staging area of this process is alive either.
 void RemoveDeadStaging(const std::string& asset_directory) {
   std::vector<fs::path> dead;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(asset_directory, ignored)) {
     const pid_t pid = PidOfStaging(entry.path().filename().string());
-    if (pid != 0 && (pid == ::getpid() || (::kill(pid, 0) != 0 && errno == ESRCH)))
-      dead.push_back(entry.path());
+    if (pid != 0 && (pid == ::getpid() || IsDead(pid))) dead.push_back(entry.path());
   }
   for (const fs::path& path : dead) fs::remove_all(path, ignored);
 }
@@ -263,6 +274,44 @@ Result<PublishedContainer> StagingArea::Publish() {
   if (error != 0)
     published.warning = FailErrno(error, "cannot sync", asset_directory).value().message;
   return published;
+}
+
+Result<int> PruneRevisions(const std::string& out_directory, const std::string& asset, int keep) {
+  PATINA_TRY(CheckAssetName(asset));
+  const std::string asset_directory = out_directory + "/" + asset;
+  std::error_code error;
+  if (!fs::is_directory(asset_directory, error))
+    return Fail(ErrorCode::kNotFound, "there is no asset " + asset_directory);
+  AssetLock lock;
+  PATINA_TRY(lock.Acquire(asset_directory, RealFileSystem()));
+  RemoveDeadStaging(asset_directory);
+  const fs::path target = fs::read_symlink(asset_directory + "/" + kCurrentName, error);
+  const int current = error ? 0 : RevisionNumber(target.string());
+  if (current == 0 || !fs::is_directory(asset_directory + "/" + target.string(), error)) return 0;
+  std::vector<int> numbers;
+  for (fs::directory_iterator entry(asset_directory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    const int number = RevisionNumber(name);
+    if (number != 0 && name == RevisionName(number)) numbers.push_back(number);
+  }
+  if (error) return FailErrno(error.value(), "cannot list", asset_directory);
+  std::sort(numbers.rbegin(), numbers.rend());
+  int removed = 0;
+  for (size_t i = static_cast<size_t>(std::max(keep, 0)); i < numbers.size(); ++i) {
+    if (numbers[i] == current) continue;
+    // Renamed first, so that half of a revision is never seen under its name; what a crash leaves
+    // is removed as dead staging.
+    const std::string revision = asset_directory + "/" + RevisionName(numbers[i]);
+    const std::string doomed = asset_directory + "/" + std::string(kStagingPrefix) +
+                               std::to_string(::getpid()) + "-" + RevisionName(numbers[i]);
+    if (const int failed = RealFileSystem().Rename(revision, doomed))
+      return FailErrno(failed, "cannot remove", revision);
+    fs::remove_all(doomed, error);
+    if (error) return FailErrno(error.value(), "cannot remove", revision);
+    ++removed;
+  }
+  return removed;
 }
 
 Result<Container> OpenContainer(const std::string& path) {

@@ -69,6 +69,11 @@ class StagingArea {
   std::unique_ptr<State> state_;
 };
 
+// Removes all revisions of an asset but the newest `keep` and the one that `current` points at, and
+// returns how many. Nothing is removed where `current` points at no revision. Errors: kConflict (a
+// bake of the asset is running), kNotFound (no such asset), kIo.
+Result<int> PruneRevisions(const std::string& out_directory, const std::string& asset, int keep);
+
 // An opened container. The directory is resolved: it does not change when `current` does.
 struct Container {
   std::string directory;

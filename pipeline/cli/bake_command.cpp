@@ -289,7 +289,7 @@ int RunCommand(const CommandLine& line, const CancelToken& cancel) {
   observers.Add(&terminal);
   JobResult result;
   if (job) {
-    result = RunJob(*job, observers, cancel);
+    result = RunJob(*job, observers, cancel, options.guards);
   } else {
     result = Unplanned("", job.error());
     observers.OnResult(result);

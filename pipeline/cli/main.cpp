@@ -49,6 +49,20 @@ int Dispatch(const CommandLine& line) {
       return EvalCommand(line);
     case Command::kSample:
       return SampleCommand(line);
+    case Command::kSubmit:
+      return SubmitCommand(line.client, g_cancel);
+    case Command::kJobs:
+      return JobsCommand(line.client, g_cancel);
+    case Command::kWatch:
+      return WatchCommand(line.client, g_cancel);
+    case Command::kCancel:
+      return CancelCommand(line.client, g_cancel);
+    case Command::kRetry:
+      return RetryCommand(line.client, g_cancel);
+    case Command::kLogs:
+      return LogsCommand(line.client, g_cancel);
+    case Command::kStatus:
+      return StatusCommand(line.client, g_cancel);
   }
   return kExitFailed;
 }

@@ -2,6 +2,7 @@
 #include "pipeline/cli/options.h"
 
 #include <CLI/CLI.hpp>
+#include <limits>
 #include <sstream>
 
 #include "pipeline/jobs/job.h"
@@ -23,6 +24,7 @@ constexpr const char* kExamples =
     "  patina compare baked/sample sample               measure a container against its source "
     "again\n"
     "  patina eval baked/chrome --pairs pairs.csv       values of a BRDF\n"
+    "  patina submit textures/wall --wait               the same by a daemon (see patinad --help)\n"
     "\n"
     "`patina COMMAND --help` explains a command. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 "
     "bad input,\n"
@@ -175,6 +177,21 @@ void AddRun(CLI::App* app, CommandLine* line) {
           "--result", line->run.result,
           "Where to write the result (default: result.json beside the events, or beside the job)")
       ->type_name("FILE");
+  RunGuards& guards = line->run.guards;
+  command->add_flag("--skip-unchanged", guards.skip_unchanged,
+                    "Bake nothing if the asset's current container is of the same fingerprint");
+  command
+      ->add_option("--not-revision", guards.not_revision,
+                   "With --skip-unchanged: bake all the same if that is this revision")
+      ->type_name("REVISION");
+  auto* fence = command
+                    ->add_option("--fence", guards.fence_file,
+                                 "Publish only while this file names the attempt")
+                    ->type_name("FILE");
+  command->add_option("--attempt", guards.attempt, "Number of the attempt, for --fence")
+      ->check(CLI::Range(int64_t{1}, std::numeric_limits<int64_t>::max()))
+      ->type_name("N")
+      ->needs(fence);
   AddCommon(command, line, true);
   command->footer(
       "The result file is written last and at once, on success and on failure. Example:\n"
@@ -296,6 +313,108 @@ void AddSample(CLI::App* app, CommandLine* line) {
   command->callback([line] { line->command = Command::kSample; });
 }
 
+CLI::App* AddClient(CLI::App* app, CommandLine* line, Command which, const char* name,
+                    const char* description) {
+  CLI::App* command =
+      app->add_subcommand(name, description)->group("Commands of a daemon's client");
+  command
+      ->add_option("--socket", line->client.socket,
+                   "The daemon's Unix socket (default: $PATINA_SOCKET, else patinad.sock in "
+                   "$XDG_STATE_HOME/patina, ~/.local/state/patina or /var/lib/patina)")
+      ->type_name("PATH");
+  command->add_flag("--json", line->client.json, "Print JSON on standard output");
+  command->add_flag("-q,--quiet", line->client.quiet, "No progress, errors only");
+  command->callback([line, which] { line->command = which; });
+  return command;
+}
+
+CLI::Option* AddIds(CLI::App* command, CommandLine* line, int most, const char* help) {
+  return command->add_option("ID", line->client.ids, help)
+      ->expected(1, most)
+      ->check(CLI::Range(int64_t{1}, std::numeric_limits<int64_t>::max()))
+      ->type_name("ID");
+}
+
+void AddSubmit(CLI::App* app, CommandLine* line) {
+  CLI::App* command =
+      AddClient(app, line, Command::kSubmit, "submit", "Put jobs into a daemon's queue");
+  ClientOptions& o = line->client;
+  command->add_option("INPUT", o.inputs, "Job files, folders of maps, BRDF files, folders of both")
+      ->required();
+  command->add_flag("-w,--wait", o.wait, "Wait for the jobs to end, and show how they go");
+  command->add_option("-p,--priority", o.priority, "The higher is run first (default 0)")
+      ->check(CLI::Range(-100, 100))
+      ->type_name("N");
+  command->add_flag("--force", o.force, "Bake even if nothing has changed");
+  command
+      ->add_option("-o,--out", o.out,
+                   "Folder for the containers (default: the job file's, else the daemon's)")
+      ->type_name("DIR");
+  command
+      ->add_option("--key", o.idempotency_key,
+                   "A name for this request: sent again, it makes no second job")
+      ->type_name("KEY");
+  command->footer(
+      "Prints a line `ID ASSET` for each job. With --wait the exit code is that of the worst job, "
+      "as of `patina bake`;\n"
+      "an interrupt ends the waiting, not the jobs.\n"
+      "\n"
+      "Examples:\n"
+      "  patina submit textures/wall --wait\n"
+      "  patina submit job.json --priority 10 --json");
+}
+
+void AddClientCommands(CLI::App* app, CommandLine* line) {
+  ClientOptions& o = line->client;
+  constexpr int kMany = 1000;
+  AddSubmit(app, line);
+
+  CLI::App* jobs =
+      AddClient(app, line, Command::kJobs, "jobs", "List a daemon's jobs, newest first");
+  jobs->add_option("--state", o.state,
+                   "Only these, separated by commas: queued, running, succeeded, failed, "
+                   "cancelled, retry_waiting, buried")
+      ->type_name("STATE");
+  jobs->add_option("--asset", o.asset, "Only those of one asset")->type_name("NAME");
+  jobs->add_option("--limit", o.limit, "At most so many (default 20)")
+      ->check(CLI::Range(1, 1000))
+      ->type_name("N");
+  jobs->footer("Example:\n  patina jobs --state running,queued");
+
+  CLI::App* watch = AddClient(app, line, Command::kWatch, "watch",
+                              "Show what happens, as it happens, until a job ends or forever");
+  AddIds(watch, line, 1, "The job to watch; all if none is named");
+  watch->footer(
+      "With an ID the exit code is that of the job, as of `patina bake`. --json prints each event "
+      "on "
+      "a line, and at\n"
+      "last the job. Example:\n"
+      "  patina watch 12");
+
+  CLI::App* cancel = AddClient(app, line, Command::kCancel, "cancel", "Cancel jobs");
+  AddIds(cancel, line, kMany, "The jobs")->required();
+  cancel->footer(
+      "A running job is asked to end, and ended after a while; `patina watch ID` waits for it.\n"
+      "Example:\n  patina cancel 12 13");
+
+  CLI::App* retry = AddClient(app, line, Command::kRetry, "retry",
+                              "Queue failed, cancelled or buried jobs again");
+  AddIds(retry, line, kMany, "The jobs")->required();
+  retry->footer("Example:\n  patina retry 12");
+
+  CLI::App* logs = AddClient(app, line, Command::kLogs, "logs", "Print what a job printed");
+  AddIds(logs, line, 1, "The job")->required();
+  logs->add_flag("-f,--follow", o.follow, "Go on until the job has ended");
+  logs->add_option("--tail", o.tail_bytes, "Only the last so many bytes")
+      ->check(CLI::Range(int64_t{1}, std::numeric_limits<int64_t>::max()))
+      ->type_name("BYTES");
+  logs->footer("Example:\n  patina logs 12 --follow");
+
+  CLI::App* status = AddClient(app, line, Command::kStatus, "status",
+                               "Say what a daemon watches, runs and waits for, and what is wrong");
+  status->footer("Example:\n  patina status");
+}
+
 }  // namespace
 
 ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
@@ -317,6 +436,7 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   AddCompare(&app, &line);
   AddEval(&app, &line);
   AddSample(&app, &line);
+  AddClientCommands(&app, &line);
   std::string topic;
   CLI::App* help = app.add_subcommand("help", "Explain a command");
   help->add_option("COMMAND", topic, "The command to explain");

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "pipeline/cli/terminal_progress.h"
+#include "pipeline/client/client_commands.h"
+#include "pipeline/jobs/run_guards.h"
 
 namespace patina {
 
@@ -38,6 +40,7 @@ struct BakeOptions {
 
 struct RunOptions {
   std::string job_file;
+  RunGuards guards;
   std::string events;  // empty: none
   std::string result;  // empty: result.json beside the events, or beside the job
 };
@@ -73,7 +76,23 @@ struct SampleOptions {
   uint64_t seed = 1;
 };
 
-enum class Command { kBake, kRun, kUnpack, kInfo, kCompare, kEval, kSample };
+enum class Command {
+  kBake,
+  kRun,
+  kUnpack,
+  kInfo,
+  kCompare,
+  kEval,
+  kSample,
+  // Of a daemon's client.
+  kSubmit,
+  kJobs,
+  kWatch,
+  kCancel,
+  kRetry,
+  kLogs,
+  kStatus
+};
 
 struct CommandLine {
   Command command = Command::kBake;
@@ -84,6 +103,7 @@ struct CommandLine {
   CompareOptions compare;
   EvalOptions eval;
   SampleOptions sample;
+  ClientOptions client;
   bool json = false;
   Verbosity verbosity = Verbosity::kNormal;
   std::string simd;  // empty: what the environment says, or the best

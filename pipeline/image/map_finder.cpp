@@ -1,7 +1,6 @@
 #include "pipeline/image/map_finder.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -10,35 +9,20 @@
 #include <utility>
 
 #include "pipeline/image/image_io.h"
-#include "pipeline/image/map_name.h"
+#include "pipeline/image/map_groups.h"
 
 namespace patina {
 namespace {
 
 namespace fs = std::filesystem;
 
-// A file whose name was understood.
-struct Candidate {
-  std::string file;
-  std::string path;
-  MapName name;
-  bool guessed = false;  // reported as a guess
-  std::string because;   // why it is a guess
-};
-
 // One claim of a file on a role.
 struct Claim {
-  const Candidate* candidate = nullptr;
+  const MapCandidate* candidate = nullptr;
   TokenPart part;
   int rank = 0;
   bool borrowed = false;  // from a group of another stem
 };
-
-std::string LowerExtension(const std::string& file) {
-  std::string extension = fs::path(file).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
 
 // Lossless and deep formats first: of two files with the same size and depth the first is used.
 int FormatOrder(const std::string& file) {
@@ -46,18 +30,6 @@ int FormatOrder(const std::string& file) {
                                                  ".hdr", ".dds", ".jpg",  ".jpeg"};
   return static_cast<int>(std::find(order.begin(), order.end(), LowerExtension(file)) -
                           order.begin());
-}
-
-bool StartsWith(const std::vector<std::string>& words, const std::vector<std::string>& prefix) {
-  return words.size() >= prefix.size() && std::equal(prefix.begin(), prefix.end(), words.begin());
-}
-
-// "shared", "common": words that mark a map as belonging to several materials.
-std::vector<std::string> WithoutSharedWords(std::vector<std::string> words) {
-  std::erase_if(words, [](const std::string& word) {
-    return word == "shared" || word == "common" || word == "all";
-  });
-  return words;
 }
 
 int DepthOf(const ImageInfo& info) {
@@ -86,251 +58,21 @@ class Headers {
   std::map<std::string, Result<ImageInfo>> headers_;
 };
 
-// Files that share the words before the map's name.
-struct Group {
-  std::vector<std::string> words;
-  std::string tile;
-  std::string stem;
-  std::vector<const Candidate*> own;
-  std::vector<const Candidate*> borrowed;
-
-  bool HasAlbedo() const {
-    return std::any_of(own.begin(), own.end(), [](const Candidate* candidate) {
-      return std::string_view(candidate->name.token->parts[0].role) == "albedo";
-    });
-  }
-};
-
 class FolderFinder {
  public:
   explicit FolderFinder(std::string folder) : folder_(std::move(folder)) {}
 
   Result<std::vector<MapSet>> Run() {
-    PATINA_TRY(List());
-    RecogniseNames();
-    AdoptUnsuffixedColors();
-    DropWeakNames();
-    if (candidates_.empty()) return NothingFound();
-    MakeGroups();
-    return MakeSets();
-  }
-
- private:
-  Status List() {
-    std::error_code error;
-    const fs::file_status status = fs::status(folder_, error);
-    if (!fs::exists(status)) {
-      return Fail(ErrorCode::kNotFound,
-                  folder_ + ": no such folder; name a folder of texture maps");
-    }
-    if (!fs::is_directory(status)) {
-      return Fail(ErrorCode::kInvalidArgument,
-                  folder_ + ": not a folder; name a folder of texture maps");
-    }
-    fs::directory_iterator entry(folder_, error), end;
-    for (; !error && entry != end; entry.increment(error)) {
-      std::error_code ignored;
-      const std::string file = entry->path().filename().string();
-      if (file[0] != '.' && entry->is_regular_file(ignored)) files_.push_back(file);
-    }
-    if (error)
-      return Fail(ErrorCode::kIo, folder_ + ": cannot list the folder: " + error.message());
-    std::sort(files_.begin(), files_.end());
-    return {};
-  }
-
-  void Note(MapNote::Kind kind, const std::string& file, const std::string& text) {
-    notes_.push_back({kind, file, text});
-  }
-  void Ignore(const std::string& file, const std::string& why) {
-    Note(MapNote::Kind::kIgnored, file, why);
-  }
-
-  void RecogniseNames() {
-    for (const std::string& file : files_) {
-      if (!HasImageExtension(file)) {
-        Ignore(file, "not an image of a format that is read");
-        continue;
-      }
-      Candidate candidate;
-      candidate.file = file;
-      candidate.path = (fs::path(folder_) / file).string();
-      candidate.name = ParseMapName(fs::path(file).stem().string());
-      if (candidate.name.token == nullptr) {
-        unknown_.push_back(std::move(candidate));
-        continue;
-      }
-      if (candidate.name.bare_number) {
-        candidate.guessed = true;
-        candidate.because = "a number follows the map's name";
-      }
-      candidates_.push_back(std::move(candidate));
-    }
-  }
-
-  // "rock.png" beside "rock_normal.png" is the base colour, as is "rusty_metal.png" beside
-  // "rusty_metal_n.png".
-  void AdoptUnsuffixedColors() {
-    const auto has_albedo = [&](const std::vector<std::string>& words) {
-      return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& other) {
-        return std::string_view(other.name.token->parts[0].role) == "albedo" &&
-               other.name.stem_words == words;
-      });
-    };
-    const auto is_stem = [&](const Candidate& candidate) {
-      const auto& words = candidate.name.all_words;
-      return !words.empty() &&
-             std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& other) {
-               return &other != &candidate && other.name.stem_words == words;
-             });
-    };
-    const auto adopt = [&](Candidate* candidate) {
-      candidate->guessed = true;
-      candidate->because = "the name is the material's own, and no other file is its base colour";
-      candidate->name.stem_words = candidate->name.all_words;
-      candidate->name.stem = fs::path(candidate->file).stem().string();
-      candidate->name.token = FindMapToken("albedo");
-    };
-    for (Candidate& candidate : candidates_) {
-      if (candidate.name.token->weak && is_stem(candidate) && !has_albedo(candidate.name.all_words))
-        adopt(&candidate);
-    }
-    std::vector<Candidate> adopted;
-    for (Candidate& candidate : unknown_) {
-      if (is_stem(candidate) && !has_albedo(candidate.name.all_words)) {
-        adopt(&candidate);
-        adopted.push_back(candidate);
-      } else {
-        Ignore(candidate.file, "no word at the end of its name says what map it is");
-      }
-    }
-    for (Candidate& candidate : adopted) candidates_.push_back(std::move(candidate));
-    std::sort(candidates_.begin(), candidates_.end(),
-              [](const Candidate& a, const Candidate& b) { return a.file < b.file; });
-  }
-
-  // Words that also name materials count only beside a map that cannot be mistaken, or beside
-  // another of the same stem.
-  void DropWeakNames() {
-    const bool any_strong =
-        std::any_of(candidates_.begin(), candidates_.end(),
-                    [](const Candidate& candidate) { return !candidate.name.token->weak; });
-    std::erase_if(candidates_, [&, all = candidates_](const Candidate& candidate) {
-      if (!candidate.name.token->weak || any_strong) return false;
-      const auto same_stem = std::count_if(all.begin(), all.end(), [&](const Candidate& other) {
-        return other.name.stem_words == candidate.name.stem_words;
-      });
-      if (same_stem > 1) return false;
-      Ignore(candidate.file,
-             "nothing but the word \"" + candidate.name.token->name + "\" says what map it is");
-      return true;
-    });
-    for (Candidate& candidate : candidates_) {
-      if (!candidate.name.token->weak || candidate.guessed) continue;
-      const auto strong_sibling =
-          std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& other) {
-            return !other.name.token->weak && other.name.stem_words == candidate.name.stem_words;
-          });
-      if (strong_sibling && candidate.name.token->name.size() > 1) continue;
-      candidate.guessed = true;
-      candidate.because = "the word \"" + candidate.name.token->name + "\" may mean something else";
-    }
-  }
-
-  tl::unexpected<Error> NothingFound() const {
-    constexpr size_t kListed = 20;
-    std::string list;
-    for (size_t i = 0; i < std::min(files_.size(), kListed); ++i)
-      list += (i == 0 ? "" : ", ") + files_[i];
-    if (files_.size() > kListed)
-      list += ", and " + std::to_string(files_.size() - kListed) + " more";
-    if (files_.empty()) list = "none";
-    return Fail(ErrorCode::kNotFound,
-                folder_ + ": no map is recognised by its name. Files: " + list +
-                    ". A name must end in a word for the map, before any resolution: " +
-                    KnownTokensText() + "; or list the maps with --maps");
-  }
-
-  void MakeGroups() {
-    std::map<std::pair<std::vector<std::string>, std::string>, Group> by_stem;
-    for (const Candidate& candidate : candidates_) {
-      Group& group = by_stem[{candidate.name.stem_words, candidate.name.tile}];
-      group.words = candidate.name.stem_words;
-      group.tile = candidate.name.tile;
-      if (group.stem.empty()) group.stem = candidate.name.stem;
-      group.own.push_back(&candidate);
-    }
-    for (auto& [key, group] : by_stem)
-      (group.HasAlbedo() ? colored_ : rest_).push_back(std::move(group));
-    DropVariants();
-    if (colored_.empty()) {
-      // No base colour at all: one set of everything.
-      colored_.push_back(std::move(rest_.front()));
-      rest_.erase(rest_.begin());
-    }
-    for (const Group& group : rest_) Lend(group);
-  }
-
-  // A group that is nothing but another base colour for a material that has its own maps.
-  void DropVariants() {
-    std::erase_if(colored_, [&](const Group& group) {
-      if (group.own.size() != 1) return false;
-      for (const Group& other : colored_) {
-        if (&other == &group || other.own.size() < 2 || other.tile != group.tile) continue;
-        if (!StartsWith(group.words, other.words) || other.words.empty()) continue;
-        Ignore(group.own[0]->file,
-               "another base colour for " + other.stem + ", which has " + AlbedoOf(other)->file);
-        return true;
-      }
-      return false;
-    });
-  }
-
-  static const Candidate* AlbedoOf(const Group& group) {
-    for (const Candidate* candidate : group.own) {
-      if (std::string_view(candidate->name.token->parts[0].role) == "albedo") return candidate;
-    }
-    return group.own[0];
-  }
-
-  void Lend(const Group& group) {
-    const std::vector<std::string> words = WithoutSharedWords(group.words);
-    bool lent = false;
-    for (Group& target : colored_) {
-      if (colored_.size() > 1 && !StartsWith(target.words, words) &&
-          !StartsWith(words, target.words))
-        continue;
-      if (colored_.size() > 1 && !group.tile.empty() && group.tile != target.tile) continue;
-      target.borrowed.insert(target.borrowed.end(), group.own.begin(), group.own.end());
-      lent = true;
-    }
-    if (lent) return;
-    for (const Candidate* candidate : group.own) {
-      Ignore(candidate->file, "the folder holds several materials and its name fits none of them");
-    }
-  }
-
-  Result<std::vector<MapSet>> MakeSets() {
-    std::string folder_name = fs::path(folder_).lexically_normal().filename().string();
-    if (folder_name.empty() || folder_name == ".") {
-      std::error_code error;
-      const fs::path absolute = fs::canonical(folder_, error);
-      folder_name = error ? "material" : absolute.filename().string();
-    }
+    PATINA_ASSIGN(const GroupedMaps grouped, GroupMaps(folder_));
     std::vector<MapSet> sets;
-    const std::vector<MapNote> common = std::move(notes_);
-    for (const Group& group : colored_) {
+    for (const MapGroup& group : grouped.groups) {
       notes_.clear();
       MapSet set;
       set.folder = folder_;
-      set.name = folder_name;
-      if (colored_.size() > 1) {
-        if (!group.stem.empty()) set.name += "_" + group.stem;
-        if (!group.tile.empty()) set.name += "_" + group.tile;
-      }
+      set.name = group.set_name;
       PATINA_TRY(FillSet(group, &set));
       set.notes = std::move(notes_);
-      set.notes.insert(set.notes.end(), common.begin(), common.end());
+      set.notes.insert(set.notes.end(), grouped.notes.begin(), grouped.notes.end());
       std::stable_sort(set.notes.begin(), set.notes.end(),
                        [](const MapNote& a, const MapNote& b) { return a.file < b.file; });
       sets.push_back(std::move(set));
@@ -338,13 +80,21 @@ class FolderFinder {
     return sets;
   }
 
-  Status FillSet(const Group& group, MapSet* set) {
+ private:
+  void Note(MapNote::Kind kind, const std::string& file, const std::string& text) {
+    notes_.push_back({kind, file, text});
+  }
+  void Ignore(const std::string& file, const std::string& why) {
+    Note(MapNote::Kind::kIgnored, file, why);
+  }
+
+  Status FillSet(const MapGroup& group, MapSet* set) {
     std::map<int, std::vector<Claim>> claims;
     PATINA_TRY(AddClaims(group.own, false, &claims));
     PATINA_TRY(AddClaims(group.borrowed, true, &claims));
     for (auto& [role, of_role] : claims) {
       PATINA_ASSIGN(const Claim best, Decide(MapRoles()[role].name, of_role));
-      const Candidate& candidate = *best.candidate;
+      const MapCandidate& candidate = *best.candidate;
       MapSource source;
       source.role = best.part.role;
       source.path = candidate.path;
@@ -367,9 +117,9 @@ class FolderFinder {
   }
 
   // Looks into headers where the number of channels decides what a file holds.
-  Status AddClaims(const std::vector<const Candidate*>& candidates, bool borrowed,
+  Status AddClaims(const std::vector<const MapCandidate*>& candidates, bool borrowed,
                    std::map<int, std::vector<Claim>>* claims) {
-    for (const Candidate* candidate : candidates) {
+    for (const MapCandidate* candidate : candidates) {
       const MapToken& token = *candidate->name.token;
       const Result<ImageInfo>& info = headers_.Get(candidate->path);
       if (!info) return Fail(info.error());
@@ -459,11 +209,6 @@ class FolderFinder {
   }
 
   std::string folder_;
-  std::vector<std::string> files_;
-  std::vector<Candidate> candidates_;
-  std::vector<Candidate> unknown_;
-  std::vector<Group> colored_;
-  std::vector<Group> rest_;
   std::vector<MapNote> notes_;
   Headers headers_;
 };
@@ -505,12 +250,6 @@ const char* MapNoteKindName(MapNote::Kind kind) {
       return "ignored";
   }
   return "found";
-}
-
-bool HasImageExtension(const std::string& file_name) {
-  static const std::set<std::string> known = {".png",  ".jpg", ".jpeg", ".tga", ".tif",
-                                              ".tiff", ".exr", ".hdr",  ".dds"};
-  return known.count(LowerExtension(file_name)) != 0;
 }
 
 Result<std::vector<MapSet>> FindMaps(const std::string& folder) {

@@ -43,10 +43,6 @@ struct MapSet {
   std::vector<MapNote> notes;  // sorted by file name
 };
 
-// True for the extensions of image formats that are read: png jpg jpeg tga tif tiff exr hdr dds, in
-// any case.
-bool HasImageExtension(const std::string& file_name);
-
 // The material sets of one folder (subfolders are not searched), sorted by stem. Files belong to
 // the set that shares the words before the map's name; if only one set has a base colour,
 // everything belongs to it. Of the same map in several sizes or formats the largest, then the most

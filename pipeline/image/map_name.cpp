@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <filesystem>
+#include <iterator>
 #include <string_view>
 
 namespace patina {
@@ -202,6 +204,19 @@ MapName ParseMapName(const std::string& text) {
   }
   if (stem_end > 0) name.stem = text.substr(stem_begin, stem_end - stem_begin);
   return name;
+}
+
+std::string LowerExtension(const std::string& file) {
+  std::string extension = std::filesystem::path(file).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
+
+bool HasImageExtension(const std::string& file_name) {
+  static constexpr std::string_view kKnown[] = {".png",  ".jpg", ".jpeg", ".tga", ".tif",
+                                                ".tiff", ".exr", ".hdr",  ".dds"};
+  return std::find(std::begin(kKnown), std::end(kKnown), LowerExtension(file_name)) !=
+         std::end(kKnown);
 }
 
 }  // namespace patina

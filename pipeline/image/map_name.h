@@ -33,4 +33,11 @@ struct MapName {
 // "metal_plate_02_diff_1k" is a diffuse map and "color_normal_thing_rough" a roughness map.
 MapName ParseMapName(const std::string& name);
 
+// What follows the last dot of a file's name, with the dot, in lower case; "" if there is none.
+std::string LowerExtension(const std::string& file);
+
+// True for the extensions of image formats that are read: png jpg jpeg tga tif tiff exr hdr dds, in
+// any case.
+bool HasImageExtension(const std::string& file_name);
+
 }  // namespace patina

@@ -35,12 +35,13 @@ class BrdfRun : public StagedRun {
  public:
   // trained: null to train alone; must outlive the run.
   BrdfRun(const Job& job, JobObserver& observer, const CancelToken& cancel,
-          const GroupTraining* trained)
-      : StagedRun(job, observer, cancel), trained_(trained) {}
+          const RunGuards& guards, const GroupTraining* trained)
+      : StagedRun(job, observer, cancel, guards), trained_(trained) {}
 
  private:
   Status RunStages() override {
     PATINA_TRY(Stage("ingest", [this] { return Ingest(); }));
+    if (FoundUnchanged()) return {};
     PATINA_TRY(Stage("train", [this] { return Train(); }));
     PATINA_TRY(Stage("package", [this] { return Package(); }));
     PATINA_TRY(Stage("verify", [this] { return Verify(); }));
@@ -216,8 +217,9 @@ void TrainGroup(std::span<const Job> jobs, const std::vector<BrdfSource>& source
 
 }  // namespace
 
-JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel) {
-  return BrdfRun(job, observer, cancel, nullptr).Run();
+JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                     const RunGuards& guards) {
+  return BrdfRun(job, observer, cancel, guards, nullptr).Run();
 }
 
 std::vector<JobResult> RunSharedBrdfJobs(std::span<const Job> jobs, size_t share,
@@ -246,7 +248,7 @@ std::vector<JobResult> RunSharedBrdfJobs(std::span<const Job> jobs, size_t share
   for (size_t i = 0; i < jobs.size(); ++i) {
     if (cancel.cancelled() && i > 0) break;
     results.push_back(
-        BrdfRun(jobs[i], observer(i), cancel, trained[i] ? &*trained[i] : nullptr).Run());
+        BrdfRun(jobs[i], observer(i), cancel, {}, trained[i] ? &*trained[i] : nullptr).Run());
     observer(i).OnResult(results.back());
   }
   return results;

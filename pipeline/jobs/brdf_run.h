@@ -11,12 +11,14 @@
 #include "pipeline/jobs/event_log.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/run_guards.h"
 
 namespace patina {
 
 // Stages: ingest (read and check the file), train, package (write grid, weights and sampler),
 // verify (decode the written bytes and measure them), report, publish.
-JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel);
+JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                     const RunGuards& guards);
 
 // Jobs of kind "brdf" that share codebooks: groups of at most `share` materials that look alike are
 // trained together (see GroupAlike), then each job runs as above with what was trained in place of

@@ -5,9 +5,10 @@
 
 namespace patina {
 
-JobResult RunJob(const Job& job, JobObserver& observer, const CancelToken& cancel) {
-  JobResult result = job.kind == JobKind::kBrdf ? RunBrdfJob(job, observer, cancel)
-                                                : RunMaterialJob(job, observer, cancel);
+JobResult RunJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                 const RunGuards& guards) {
+  JobResult result = job.kind == JobKind::kBrdf ? RunBrdfJob(job, observer, cancel, guards)
+                                                : RunMaterialJob(job, observer, cancel, guards);
   observer.OnResult(result);
   return result;
 }

@@ -5,6 +5,7 @@
 #include "pipeline/jobs/event_log.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/run_guards.h"
 
 namespace patina {
 
@@ -19,6 +20,7 @@ namespace patina {
 // Unless it is done, nothing is published, an earlier container is as it was, and what was staged
 // is removed. The bytes of the container depend on the input and the job alone (run.json excepted),
 // not on the number of threads.
-JobResult RunJob(const Job& job, JobObserver& observer, const CancelToken& cancel);
+JobResult RunJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                 const RunGuards& guards = {});
 
 }  // namespace patina

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 
+#include "pipeline/image/map_name.h"
 #include "pipeline/jobs/brdf_files.h"
 
 namespace patina {

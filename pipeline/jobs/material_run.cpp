@@ -25,8 +25,9 @@ std::string Decimals(int digits, double value) {
 
 class MaterialRun : public StagedRun {
  public:
-  MaterialRun(const Job& job, JobObserver& observer, const CancelToken& cancel)
-      : StagedRun(job, observer, cancel) {
+  MaterialRun(const Job& job, JobObserver& observer, const CancelToken& cancel,
+              const RunGuards& guards)
+      : StagedRun(job, observer, cancel, guards) {
     result_.profile = ProfileName(job.profile);
   }
 
@@ -36,6 +37,7 @@ class MaterialRun : public StagedRun {
     reading_input_ = true;
     PATINA_TRY(Stage("reference", [this] { return BuildSource(); }));
     reading_input_ = false;
+    if (FoundUnchanged()) return {};
     PATINA_TRY(Stage("train", [this] { return Train(); }));
     PATINA_TRY(Stage("package", [this] { return Package(); }));
     PATINA_TRY(Stage("verify", [this] { return Verify(); }));
@@ -132,6 +134,7 @@ class MaterialRun : public StagedRun {
   // Keeps what missed the gate for a look, in place of what missed it before.
   Status Reject() {
     PATINA_TRY(AddRunRecord(Curve()));
+    PATINA_TRY(PassFence());
     const std::filesystem::path rejected =
         std::filesystem::path(job_.out) / job_.asset / "rejected";
     std::error_code error;
@@ -170,8 +173,9 @@ class MaterialRun : public StagedRun {
 
 }  // namespace
 
-JobResult RunMaterialJob(const Job& job, JobObserver& observer, const CancelToken& cancel) {
-  return MaterialRun(job, observer, cancel).Run();
+JobResult RunMaterialJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                         const RunGuards& guards) {
+  return MaterialRun(job, observer, cancel, guards).Run();
 }
 
 }  // namespace patina

@@ -31,13 +31,15 @@ void StageSink::OnWarning(const std::string& message) {
   observer_.OnWarning(message);
 }
 
-StagedRun::StagedRun(const Job& job, JobObserver& observer, const CancelToken& cancel)
+StagedRun::StagedRun(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                     const RunGuards& guards)
     : job_(job),
       observer_(observer),
       cancel_(cancel),
       sink_(observer, &result_.warnings),
       start_(Clock::now()),
-      start_cpu_(ProcessCpuSeconds()) {}
+      start_cpu_(ProcessCpuSeconds()),
+      guards_(guards) {}
 
 JobResult StagedRun::Run() {
   ResetPeakMemory();
@@ -95,6 +97,27 @@ Status StagedRun::OpenStaging() {
   return {};
 }
 
+bool StagedRun::FoundUnchanged() {
+  if (!guards_.skip_unchanged) return false;
+  auto current = OpenContainer(job_.out + "/" + job_.asset + "/" + kCurrentName);
+  if (!current || current->manifest.fingerprint != result_.fingerprint) return false;
+  const std::string revision = std::filesystem::path(current->directory).filename().string();
+  if (revision == guards_.not_revision || !VerifyPayloads(*current)) return false;
+  // The gate is no part of the fingerprint: a new one is measured.
+  if (job_.min_psnr_db > current->manifest.quality.gate_min_psnr_db.value_or(0)) return false;
+  result_.container = job_.out + "/" + job_.asset + "/" + revision;
+  result_.revision = revision;
+  result_.stopped_by = "unchanged";
+  return true;
+}
+
+Status StagedRun::PassFence() {
+  if (guards_.fence_file.empty() || fence_) return {};
+  PATINA_ASSIGN(FenceHold hold, FenceHold::Acquire(guards_.fence_file, guards_.attempt));
+  fence_.emplace(std::move(hold));
+  return {};
+}
+
 Status StagedRun::AddPreview(const RgbImage& sheet) {
   // Images are written to files only; the payload is its bytes.
   const std::string path = staging_->directory() + "/preview.tmp.png";
@@ -131,6 +154,7 @@ Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {
 
 Status StagedRun::Publish(std::vector<RunCurvePoint> curve) {
   PATINA_TRY(AddRunRecord(std::move(curve)));
+  PATINA_TRY(PassFence());
   PATINA_ASSIGN(PublishedContainer published, staging_->Publish());
   result_.container = published.directory;
   result_.revision = published.revision;

@@ -14,6 +14,7 @@
 #include "pipeline/jobs/event_log.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/run_guards.h"
 #include "pipeline/jobs/run_record.h"
 #include "pipeline/jobs/sheet.h"
 #include "pipeline/kernels/dispatch.h"
@@ -41,8 +42,9 @@ class StageSink : public ProgressSink {
 // its result in a member.
 class StagedRun {
  public:
-  // All three must outlive it.
-  StagedRun(const Job& job, JobObserver& observer, const CancelToken& cancel);
+  // The first three must outlive it.
+  StagedRun(const Job& job, JobObserver& observer, const CancelToken& cancel,
+            const RunGuards& guards);
   virtual ~StagedRun() = default;
   StagedRun(const StagedRun&) = delete;
   StagedRun& operator=(const StagedRun&) = delete;
@@ -59,6 +61,11 @@ class StagedRun {
   // the staging area and the threads.
   Status ChooseSimdTarget();
   Status OpenStaging();
+  // Whether the guards ask to leave it at what is there: result_ then describes `current`. Call
+  // once the fingerprint is known.
+  bool FoundUnchanged();
+  // Call right before anything becomes visible; until the run ends no other attempt takes over.
+  Status PassFence();
   // Writes a picture as the payload preview.png.
   Status AddPreview(const RgbImage& sheet);
   Status AddRunRecord(std::vector<RunCurvePoint> curve);
@@ -86,6 +93,8 @@ class StagedRun {
   std::string stage_;
   std::vector<StageCost> stages_;
   SimdTarget simd_ = SimdTarget::kAvx2;
+  RunGuards guards_;
+  std::optional<FenceHold> fence_;
 };
 
 }  // namespace patina

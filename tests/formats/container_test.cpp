@@ -259,6 +259,40 @@ TEST(Container, StagingOfLiveProcessesIsLeftAlone) {
   EXPECT_FALSE(fs::exists(out / "asset/.staging-4194305-3"));
 }
 
+TEST(Container, PruningKeepsTheNewestAndTheCurrentRevision) {
+  const TemporaryDirectory out;
+  for (int i = 1; i <= 5; ++i) ASSERT_OK(PublishSample(out.path(), 1));
+  fs::remove(out / "asset/current");
+  fs::create_symlink("r0002", out / "asset/current");
+  fs::create_directories(out / "asset/r12");  // not a name that a bake gives
+  fs::create_directories(out / "asset/rejected");
+  EXPECT_EQ(*PruneRevisions(out.path(), "asset", 2), 2);
+  EXPECT_EQ(Entries(out / "asset"), (std::vector<std::string>{".lock", "current", "r0002", "r0004",
+                                                              "r0005", "r12", "rejected"}));
+  EXPECT_EQ(*PruneRevisions(out.path(), "asset", 0), 2);
+  EXPECT_TRUE(OpenContainer(out / "asset"));
+  EXPECT_EQ(PruneRevisions(out.path(), "other", 1).error().code, ErrorCode::kNotFound);
+}
+
+TEST(Container, PruningTouchesNothingWhereCurrentIsBrokenOrABakeRuns) {
+  const TemporaryDirectory out;
+  ASSERT_OK(PublishSample(out.path(), 1));
+  ASSERT_OK(PublishSample(out.path(), 1));
+  {
+    const auto baking = StagingArea::Create(out.path(), "asset");
+    ASSERT_OK(baking);
+    EXPECT_EQ(PruneRevisions(out.path(), "asset", 0).error().code, ErrorCode::kConflict);
+  }
+  fs::remove(out / "asset/current");
+  for (const char* target : {"r0009", "../asset/r0001", "r0001/manifest.json"}) {
+    fs::create_symlink(target, out / "asset/current");
+    EXPECT_EQ(*PruneRevisions(out.path(), "asset", 0), 0) << target;
+    fs::remove(out / "asset/current");
+  }
+  EXPECT_EQ(*PruneRevisions(out.path(), "asset", 0), 0);
+  EXPECT_TRUE(fs::exists(out / "asset/r0001"));
+}
+
 TEST(Container, DoesNotReplaceACurrentThatIsNotALink) {
   const TemporaryDirectory out;
   fs::create_directories(out / "asset/current");

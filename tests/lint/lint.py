@@ -22,8 +22,17 @@ PIPELINE_TIERS = {
     "bc6": 2, "color": 2, "healpix": 2, "image": 2, "metrics": 2, "nn": 2,
     "brdf": 3, "material": 3, "simulate": 3,
     "jobs": 4,
-    "cli": 5,
+    "client": 5,
+    "cli": 6,
 }
+# The same of daemon/; what lies directly in it (main.cpp) may use all of them.
+DAEMON_TIERS = {
+    "base": 0,
+    "config": 1, "execute": 1, "queue": 1,
+    "service": 2,
+    "api": 3, "watch": 3,
+}
+MODULE_TIERS = {"pipeline": PIPELINE_TIERS, "daemon": DAEMON_TIERS}
 # Includes between modules of one tier, as (from, to).
 SAME_TIER_ALLOWED = {("image", "color"), ("metrics", "color")}
 
@@ -126,15 +135,16 @@ def include_direction(tree, report):
                 report(path, number, f"{parts[0]} may not include {target[0]}")
             elif TOP_LAYERS[target[0]] > TOP_LAYERS[parts[0]]:
                 report(path, number, f"{parts[0]} may not include {target[0]}: it is a higher layer")
-            elif parts[0] == target[0] == "pipeline" and parts[1] != target[1]:
-                from_tier, to_tier = PIPELINE_TIERS.get(parts[1]), PIPELINE_TIERS.get(target[1])
+            elif parts[0] == target[0] and parts[0] in MODULE_TIERS and len(parts) > 2 and parts[1] != target[1]:
+                top, tiers = parts[0], MODULE_TIERS[parts[0]]
+                from_tier, to_tier = tiers.get(parts[1]), tiers.get(target[1])
                 if from_tier is None or to_tier is None:
                     unknown = parts[1] if from_tier is None else target[1]
-                    report(path, number, f"pipeline/{unknown} has no tier: add it to lint.py and CONTRIBUTING.md")
+                    report(path, number, f"{top}/{unknown} has no tier: add it to lint.py and CONTRIBUTING.md")
                 elif to_tier > from_tier:
-                    report(path, number, f"pipeline/{parts[1]} may not include pipeline/{target[1]}: it is a higher tier")
+                    report(path, number, f"{top}/{parts[1]} may not include {top}/{target[1]}: it is a higher tier")
                 elif to_tier == from_tier and (parts[1], target[1]) not in SAME_TIER_ALLOWED:
-                    report(path, number, f"pipeline/{parts[1]} may not include pipeline/{target[1]}: same tier")
+                    report(path, number, f"{top}/{parts[1]} may not include {top}/{target[1]}: same tier")
 
 
 def heavy_headers(tree, report):

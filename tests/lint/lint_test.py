@@ -66,6 +66,14 @@ class LintTest(unittest.TestCase):
         self.expect("include_direction", "pipeline/novel/bad.h", 1,
                     {"pipeline/novel/bad.h": '#include "pipeline/base/b.h"\n'})
 
+    def test_the_daemon_has_tiers_too(self):
+        self.expect("include_direction", "daemon/base/bad.h", 1,
+                    {"daemon/base/bad.h": '#include "daemon/queue/q.h"\n', "daemon/queue/q.h": ""})
+        self.expect("include_direction", "daemon/api/bad.h", 1,
+                    {"daemon/api/bad.h": '#include "daemon/watch/w.h"\n', "daemon/watch/w.h": ""})
+        self.assertEqual(self.findings({"daemon/main.cpp": '#include "daemon/api/a.h"\n',
+                                        "daemon/api/a.h": '#include "daemon/base/b.h"\n', "daemon/base/b.h": ""}), [])
+
     def test_includes_are_written_from_the_root(self):
         self.expect("include_direction", "formats/bad.cpp", 1, {"formats/bad.cpp": '#include "a.h"\n'})
 

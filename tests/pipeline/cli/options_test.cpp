@@ -93,6 +93,16 @@ TEST(ParseCommandLine, ReadsTheOtherCommands) {
   EXPECT_EQ(run.command->run.job_file, "j.json");
   EXPECT_EQ(run.command->run.events, "e");
   EXPECT_EQ(run.command->run.result, "r");
+  EXPECT_FALSE(run.command->run.guards.skip_unchanged);
+  const ParsedCommandLine guarded = Parse({"run", "j.json", "--skip-unchanged", "--not-revision",
+                                           "r0001", "--fence", "f", "--attempt", "3"});
+  ASSERT_TRUE(guarded.command);
+  EXPECT_TRUE(guarded.command->run.guards.skip_unchanged);
+  EXPECT_EQ(guarded.command->run.guards.not_revision, "r0001");
+  EXPECT_EQ(guarded.command->run.guards.fence_file, "f");
+  EXPECT_EQ(guarded.command->run.guards.attempt, 3);
+  EXPECT_FALSE(Parse({"run", "j.json", "--attempt", "3"}).command);
+  EXPECT_FALSE(Parse({"run", "j.json", "--fence", "f", "--attempt", "0"}).command);
   const ParsedCommandLine unpack =
       Parse({"unpack", "c", "--out", "d", "--mip", "3", "--format", "exr"});
   ASSERT_TRUE(unpack.command);
@@ -146,6 +156,43 @@ TEST(ProgressLine, LeavesOutWhatIsNotKnown) {
   event.eta_s = 11.2;
   EXPECT_EQ(ProgressLine("floor", event),
             "floor: train 63 %, 29.4 M samples/s, 31.2 dB, 11 s left");
+}
+
+TEST(ParseCommandLine, ReadsTheCommandsOfADaemonsClient) {
+  const ParsedCommandLine submit = Parse({"submit", "a", "b.json", "--wait", "--priority", "-7",
+                                          "--socket", "s", "--json", "--force", "--key", "k"});
+  ASSERT_TRUE(submit.command) << submit.text;
+  EXPECT_EQ(submit.command->command, Command::kSubmit);
+  const ClientOptions& o = submit.command->client;
+  EXPECT_EQ(o.inputs, (std::vector<std::string>{"a", "b.json"}));
+  EXPECT_TRUE(o.wait && o.json && o.force);
+  EXPECT_EQ(o.priority, -7);
+  EXPECT_EQ(o.socket, "s");
+  EXPECT_EQ(o.idempotency_key, "k");
+  const ParsedCommandLine cancel = Parse({"cancel", "1", "22"});
+  ASSERT_TRUE(cancel.command) << cancel.text;
+  EXPECT_EQ(cancel.command->client.ids, (std::vector<int64_t>{1, 22}));
+  const ParsedCommandLine watch = Parse({"watch"});
+  ASSERT_TRUE(watch.command) << watch.text;
+  EXPECT_TRUE(watch.command->client.ids.empty());
+  for (const char* command : {"jobs", "status"}) EXPECT_TRUE(Parse({command, "--json"}).command);
+  EXPECT_TRUE(Parse({"logs", "3", "--follow", "--tail", "100"}).command);
+}
+
+TEST(ParseCommandLine, RefusesWhatNoDaemonTakes) {
+  for (const std::vector<const char*>& arguments : {std::vector<const char*>{"submit"},
+                                                    {"submit", "a", "--priority", "101"},
+                                                    {"cancel"},
+                                                    {"cancel", "0"},
+                                                    {"cancel", "x"},
+                                                    {"watch", "1", "2"},
+                                                    {"logs"},
+                                                    {"jobs", "--limit", "0"},
+                                                    {"retry", "-1"}}) {
+    const ParsedCommandLine parsed = Parse(arguments);
+    EXPECT_FALSE(parsed.command);
+    EXPECT_EQ(parsed.exit_code, 2) << parsed.text;
+  }
 }
 
 TEST(DurationText, ChangesItsUnit) {

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
 
+#include "pipeline/image/map_groups.h"
 #include "tests/pipeline/image/image_files.h"
 
 namespace patina {
@@ -187,6 +189,19 @@ TEST_F(MapFinder, FindsSeveralMaterials) {
                           "?opacity=ToyCar_basecolor.png:a"));
   EXPECT_THAT((*sets)[0].name, testing::EndsWith("_Fabric"));
   EXPECT_THAT((*sets)[1].name, testing::EndsWith("_ToyCar"));
+}
+
+TEST_F(MapFinder, NamesSetsWithoutOpeningAFile) {
+  for (const char* file : {"ToyCar_basecolor.png", "ToyCar_normal.png", "Fabric_basecolor.png"})
+    std::ofstream(folder_.path() + "/" + file) << "no image";
+  auto names = FindSetNames(folder_.path());
+  ASSERT_TRUE(names) << names.error().message;
+  EXPECT_THAT(*names, ElementsAre(testing::EndsWith("_Fabric"), testing::EndsWith("_ToyCar")));
+  EXPECT_FALSE(FindMaps(folder_.path()));
+  std::filesystem::remove(folder_.path() + "/Fabric_basecolor.png");
+  names = FindSetNames(folder_.path());
+  ASSERT_TRUE(names) << names.error().message;
+  EXPECT_EQ(names->size(), 1u);
 }
 
 TEST_F(MapFinder, LendsSharedMapsToEveryMaterialTheyFit) {

@@ -1,0 +1,23 @@
+// Who may use the API over TCP. (On the Unix socket the file's mode decides.)
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "formats/base/result.h"
+
+namespace patina::daemon {
+
+// The token in a file: its content without white space at the end. Errors: those of ReadTextFile;
+// kInvalidArgument: others than the owner may read or write the file, or what is in it is shorter
+// than 16 characters or not made of those that a header can carry.
+Result<std::string> ReadTokenFile(const std::string& path);
+
+// Whether an Authorization header carries the token; takes the same time for every wrong one.
+bool CarriesToken(std::string_view authorization, std::string_view token);
+
+// Whether a Host header means this machine: 127.x.y.z, [::1] or localhost, with any port. A page of
+// another site whose name was made to point here carries that site's name.
+bool IsLocalHost(std::string_view host);
+
+}  // namespace patina::daemon

@@ -1,0 +1,89 @@
+#include "daemon/api/container_files.h"
+
+#include <fcntl.h>
+#include <linux/openat2.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+
+#include "formats/base/file_io.h"
+#include "formats/base/names.h"
+
+namespace patina::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kMaxFiles = 1000;
+
+struct Extension {
+  const char* end;
+  const char* content_type;
+};
+constexpr Extension kExtensions[] = {
+    {".json", "application/json"}, {".html", "text/html; charset=utf-8"}, {".png", "image/png"},
+    {".dds", "image/vnd-ms.dds"},  {".csv", "text/csv; charset=utf-8"},
+};
+
+}  // namespace
+
+Result<OpenedFile> OpenBelow(const std::string& folder, const std::string& name) {
+  PATINA_TRY(CheckRelativePath(name, "file name"));
+  const UniqueFd root(open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+  if (!root) return FailErrno(errno, "cannot open", folder);
+  open_how how{};
+  how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
+  how.resolve = RESOLVE_BENEATH | RESOLVE_NO_SYMLINKS | RESOLVE_NO_MAGICLINKS;
+  OpenedFile file;
+  file.fd =
+      UniqueFd(static_cast<int>(syscall(SYS_openat2, root.get(), name.c_str(), &how, sizeof how)));
+  if (!file.fd) {
+    const int error = errno;
+    if (error == ELOOP || error == EXDEV || error == ENOTDIR)
+      return Fail(ErrorCode::kNotFound, "there is no file " + QuoteForMessage(name));
+    return FailErrno(error, "cannot open", name);
+  }
+  struct stat info {};
+  if (fstat(file.fd.get(), &info) != 0) return FailErrno(errno, "cannot look at", name);
+  if (!S_ISREG(info.st_mode))
+    return Fail(ErrorCode::kNotFound, QuoteForMessage(name) + " is no file");
+  file.bytes = static_cast<uint64_t>(info.st_size);
+  file.mtime_ns = info.st_mtim.tv_sec * 1000000000 + info.st_mtim.tv_nsec;
+  return file;
+}
+
+Result<std::vector<ContainerFile>> FilesBelow(const std::string& folder) {
+  std::vector<ContainerFile> files;
+  std::error_code error;
+  fs::recursive_directory_iterator entry(folder, error), end;
+  for (; !error && entry != end && files.size() < kMaxFiles; entry.increment(error)) {
+    std::error_code ignored;
+    if (entry->is_symlink(ignored) || !entry->is_regular_file(ignored)) continue;
+    const uintmax_t bytes = entry->file_size(ignored);
+    if (ignored) continue;
+    files.push_back({entry->path().lexically_relative(folder).generic_string(), bytes});
+  }
+  if (error) {
+    return Fail(
+        error == std::errc::no_such_file_or_directory ? ErrorCode::kNotFound : ErrorCode::kIo,
+        "cannot list the container: " + error.message());
+  }
+  std::sort(files.begin(), files.end(),
+            [](const ContainerFile& a, const ContainerFile& b) { return a.name < b.name; });
+  return files;
+}
+
+const char* ContentTypeOf(const std::string& name) {
+  for (const Extension& extension : kExtensions) {
+    const std::string_view end = extension.end;
+    if (name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0)
+      return extension.content_type;
+  }
+  return "application/octet-stream";
+}
+
+}  // namespace patina::daemon

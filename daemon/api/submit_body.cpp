@@ -1,0 +1,204 @@
+#include "daemon/api/submit_body.h"
+
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+
+namespace patina::daemon {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kDeepest = 24;
+constexpr size_t kMaxProblems = 50;
+constexpr int64_t kMaxLimit = int64_t{1} << 40;
+
+std::string Escaped(const std::string& key) {
+  std::string out;
+  for (const char c : key) {
+    if (c == '~') {
+      out += "~0";
+    } else if (c == '/') {
+      out += "~1";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+// Parses text, refusing what the library would let through: keys that stand twice, and nesting so
+// deep that the value could not be printed.
+bool Parse(std::string_view text, Json* json, std::vector<FieldProblem>* problems) {
+  std::vector<std::set<std::string>> keys;
+  std::string twice;
+  bool too_deep = false;
+  const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
+    too_deep = too_deep || depth > kDeepest;
+    if (too_deep) return false;
+    if (event == Json::parse_event_t::object_start) {
+      keys.emplace_back();
+    } else if (event == Json::parse_event_t::object_end) {
+      keys.pop_back();
+    } else if (event == Json::parse_event_t::key) {
+      std::string key = parsed.get<std::string>();
+      if (!keys.back().insert(key).second && twice.empty()) twice = std::move(key);
+    }
+    return true;
+  };
+  try {
+    *json = Json::parse(text.begin(), text.end(), watch);
+  } catch (const Json::exception& error) {
+    problems->push_back({"", std::string("not JSON: ") + error.what()});
+    return false;
+  }
+  if (too_deep) problems->push_back({"", "nested deeper than any request is"});
+  if (!twice.empty()) problems->push_back({"", "the key \"" + twice + "\" stands twice"});
+  if (problems->empty() && !json->is_object()) problems->push_back({"", "must be a JSON object"});
+  return problems->empty();
+}
+
+class Reader {
+ public:
+  Reader(const Json& object, std::string pointer, std::vector<FieldProblem>* problems)
+      : object_(object), pointer_(std::move(pointer)), problems_(problems) {}
+
+  const Json* Find(const char* key) {
+    known_.insert(key);
+    const auto found = object_.find(key);
+    return found == object_.end() ? nullptr : &*found;
+  }
+
+  void Complain(const std::string& key, const std::string& detail) {
+    if (problems_->size() < kMaxProblems)
+      problems_->push_back({pointer_ + "/" + Escaped(key), detail});
+  }
+
+  std::optional<int64_t> Integer(const char* key, int64_t least, int64_t most) {
+    const Json* value = Find(key);
+    if (value == nullptr) return std::nullopt;
+    const bool fits = value->is_number_integer() &&
+                      (!value->is_number_unsigned() ||
+                       value->get<uint64_t>() <= std::numeric_limits<int64_t>::max()) &&
+                      value->get<int64_t>() >= least && value->get<int64_t>() <= most;
+    if (fits) return value->get<int64_t>();
+    Complain(key, "must be a whole number from " + std::to_string(least) + " to " +
+                      std::to_string(most));
+    return std::nullopt;
+  }
+
+  void RefuseUnknown() {
+    for (const auto& [key, value] : object_.items()) {
+      if (known_.count(key) != 0) continue;
+      std::string list;
+      for (const std::string& known : known_) list += (list.empty() ? "" : ", ") + known;
+      Complain(key, "is not known; known are " + list);
+    }
+  }
+
+ private:
+  const Json& object_;
+  std::string pointer_;
+  std::vector<FieldProblem>* problems_;
+  std::set<std::string> known_;
+};
+
+void ReadLimits(const Json& limits, ParsedSubmit* parsed) {
+  if (!limits.is_object()) {
+    parsed->problems.push_back({"/limits", "must be an object"});
+    return;
+  }
+  Reader reader(limits, "/limits", &parsed->problems);
+  parsed->request.memory_mb = reader.Integer("memory_mb", 0, kMaxLimit);
+  parsed->request.cpu_s = reader.Integer("cpu_s", 0, kMaxLimit);
+  parsed->request.wall_s = reader.Integer("wall_s", 0, kMaxLimit);
+  reader.RefuseUnknown();
+}
+
+void RefuseRelative(const std::string& path, const std::string& pointer, ParsedSubmit* parsed) {
+  if (!path.empty() && path[0] != '/') {
+    parsed->problems.push_back(
+        {pointer, "must be an absolute path: the daemon has another working folder than you"});
+  }
+}
+
+void ReadJob(Json job, const std::string& default_out, ParsedSubmit* parsed) {
+  if (!job.is_object()) {
+    parsed->problems.push_back({"/job", "must be an object, as in a job file"});
+    return;
+  }
+  if (!job.contains("version")) job["version"] = kJobVersion;
+  if (!job.contains("out")) job["out"] = default_out;
+  auto read = ParseJob(job.dump(), "", "job");
+  if (!read) {
+    parsed->problems = FieldProblemsOf(read.error().message, "/job");
+    if (parsed->problems.empty()) parsed->problems.push_back({"/job", read.error().message});
+    return;
+  }
+  RefuseRelative(read->file, "/job/file", parsed);
+  RefuseRelative(read->folder, "/job/folder", parsed);
+  RefuseRelative(read->out, "/job/out", parsed);
+  if (read->folder.empty()) {
+    for (size_t i = 0; i < read->maps.size(); ++i)
+      RefuseRelative(read->maps[i].file, "/job/maps/" + std::to_string(i) + "/file", parsed);
+  }
+  parsed->request.job = std::move(*read);
+}
+
+}  // namespace
+
+ParsedSubmit ParseSubmit(std::string_view body, const std::string& default_out) {
+  ParsedSubmit parsed;
+  Json json;
+  if (!Parse(body, &json, &parsed.problems)) return parsed;
+  std::vector<FieldProblem> problems;
+  Reader reader(json, "", &problems);
+  const Json* job = reader.Find("job");
+  if (job == nullptr) {
+    reader.Complain("job", "is missing");
+  } else {
+    ReadJob(*job, default_out, &parsed);
+  }
+  if (const Json* limits = reader.Find("limits")) ReadLimits(*limits, &parsed);
+  parsed.request.priority =
+      static_cast<int>(reader.Integer("priority", kMinPriority, kMaxPriority).value_or(0));
+  if (const Json* force = reader.Find("force")) {
+    if (force->is_boolean()) {
+      parsed.request.force = force->get<bool>();
+    } else {
+      reader.Complain("force", "must be true or false");
+    }
+  }
+  reader.RefuseUnknown();
+  parsed.problems.insert(parsed.problems.begin(), problems.begin(), problems.end());
+  return parsed;
+}
+
+std::vector<FieldProblem> CheckEmptyBody(std::string_view body) {
+  std::vector<FieldProblem> problems;
+  if (body.find_first_not_of(" \t\r\n") == std::string_view::npos) return problems;
+  Json json;
+  if (!Parse(body, &json, &problems)) return problems;
+  for (const auto& [key, value] : json.items()) {
+    if (problems.size() < kMaxProblems)
+      problems.push_back({"/" + Escaped(key), "is not known; this request has no fields"});
+  }
+  return problems;
+}
+
+ParsedPriority ParsePriority(std::string_view body) {
+  ParsedPriority parsed;
+  Json json;
+  if (!Parse(body, &json, &parsed.problems)) return parsed;
+  Reader reader(json, "", &parsed.problems);
+  if (reader.Find("priority") == nullptr) {
+    reader.Complain("priority", "is missing");
+  } else {
+    parsed.priority =
+        static_cast<int>(reader.Integer("priority", kMinPriority, kMaxPriority).value_or(0));
+  }
+  reader.RefuseUnknown();
+  return parsed;
+}
+
+}  // namespace patina::daemon

@@ -1,0 +1,37 @@
+#include "daemon/base/state_lock.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+#include "formats/base/file_io.h"
+#include "formats/base/names.h"
+
+namespace patina::daemon {
+
+Result<StateLock> StateLock::Acquire(const std::string& state_dir) {
+  const std::string path = state_dir + "/patinad.lock";
+  UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
+  if (!fd) return FailErrno(errno, "cannot create", path);
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK) return FailErrno(errno, "cannot lock", path);
+    char text[32];
+    const ssize_t n = ::pread(fd.get(), text, sizeof text, 0);
+    std::string holder(text, n > 0 ? static_cast<size_t>(n) : 0);
+    while (!holder.empty() && holder.back() == '\n') holder.pop_back();
+    return Fail(ErrorCode::kConflict, "another patinad has the state folder " + state_dir +
+                                          ": process " +
+                                          (holder.empty() ? "unknown" : QuoteForMessage(holder)) +
+                                          "; stop that one, or give this one another --state");
+  }
+  const std::string pid = std::to_string(::getpid()) + "\n";
+  if (::ftruncate(fd.get(), 0) != 0 ||
+      ::pwrite(fd.get(), pid.data(), pid.size(), 0) != static_cast<ssize_t>(pid.size())) {
+    return FailErrno(errno, "cannot write", path);
+  }
+  return StateLock(std::move(fd));
+}
+
+}  // namespace patina::daemon

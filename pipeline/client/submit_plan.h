@@ -1,0 +1,29 @@
+// From what somebody wants to have baked to the bodies of POST /v1/jobs.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "pipeline/jobs/job.h"
+
+namespace patina {
+
+struct PlannedSubmit {
+  std::string asset;
+  std::string body;            // JSON; empty if there is an error
+  std::optional<Error> error;  // why there is no job
+};
+
+struct SubmitSettings {
+  std::string out;  // empty: the job's, else the daemon's
+  int priority = 0;
+  bool force = false;
+};
+
+// input: a job file, a BRDF file, a folder of maps, or a folder of such. Paths are made absolute:
+// the daemon has another working folder. Assets that cannot be baked are listed with their error.
+std::vector<PlannedSubmit> PlanSubmit(const std::string& input, const SubmitSettings& settings);
+
+}  // namespace patina

@@ -1,0 +1,64 @@
+#include "daemon/service/roots.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/formats/test_support.h"
+
+namespace patina::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(Roots, DecideAfterResolvingLinks) {
+  const patina::test::TemporaryDirectory folder;
+  fs::create_directories(folder / "root/inner");
+  fs::create_directories(folder / "root2");
+  fs::create_directory_symlink("..", folder / "root/up");
+  fs::create_directory_symlink(folder / "root", folder / "alias");
+  const std::vector<std::string> roots{folder / "root"};
+  for (const char* inside : {"root", "root/", "root/inner", "root/new/file", "alias/inner",
+                             "root/up/root/inner", "root2/../root/inner"}) {
+    EXPECT_TRUE(LiesWithin(folder / inside, roots)) << inside;
+  }
+  for (const char* outside : {"", "root2", "root/..", "root/up", "root/up/root2", "rootx"}) {
+    EXPECT_FALSE(LiesWithin(folder / outside, roots)) << outside;
+  }
+  EXPECT_FALSE(LiesWithin(folder / "root", {}));
+}
+
+TEST(Roots, AJobsPathsAreReplacedByWhatTheyResolveTo) {
+  const patina::test::TemporaryDirectory folder;
+  fs::create_directories(folder / "in/wall");
+  fs::create_directory_symlink(folder / "in", folder / "alias");
+  const Roots roots{{folder / "in"}, {folder / "out"}};
+  Job job;
+  job.folder = folder / "alias/wall";
+  job.out = folder / "out";
+  job.maps.resize(1);
+  job.maps[0].file = "albedo.png";
+  ASSERT_OK(ConfineJob(roots, &job));
+  const std::string real = fs::canonical(folder / "in/wall").string();
+  EXPECT_EQ(job.folder, real);
+  EXPECT_EQ(job.maps[0].file, real + "/albedo.png");
+  job.maps[0].file = "../../secret.png";
+  EXPECT_EQ(patina::test::MessageOf(ConfineJob(roots, &job)).rfind("/maps/0/file: ", 0), 0u);
+}
+
+TEST(Roots, LinksWithinTheRootsAreInputsToo) {
+  const patina::test::TemporaryDirectory folder;
+  fs::create_directories(folder / "in/wall");
+  fs::create_directories(folder / "in/shared");
+  std::ofstream(folder / "in/shared/a.png") << "a";
+  std::ofstream(folder / "secret.png") << "s";
+  fs::create_symlink(folder / "in/shared/a.png", folder / "in/wall/a.png");
+  fs::create_symlink(folder / "secret.png", folder / "in/wall/s.png");
+  Job job;
+  job.folder = folder / "in/wall";
+  EXPECT_EQ(InputsOf(job, {{folder / "in"}, {}}),
+            (std::vector<std::string>{folder / "in/wall",
+                                      fs::canonical(folder / "in/shared/a.png").string()}));
+}
+
+}  // namespace
+}  // namespace patina::daemon

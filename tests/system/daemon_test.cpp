@@ -1,0 +1,210 @@
+// The real patinad with the real `patina run`.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "tests/formats/test_support.h"
+#include "tests/system/child_process.h"
+#include "tests/system/daemon_process.h"
+
+namespace patina {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_support::DaemonProcess;
+using testing_support::Patina;
+using testing_support::ReadAll;
+using testing_support::Snapshot;
+
+class DaemonTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directories(folder_ / "drop");
+    std::ofstream(folder_ / "config.json") << R"({"version": 1, "stop_grace_s": 60,
+      "watch": [{"path": "drop", "settle_ms": 50}], "retry": {"base_ms": 1, "max_ms": 1}})";
+  }
+
+  std::vector<std::string> Arguments() const {
+    return {"--config", folder_ / "config.json", "--out",        folder_ / "out",
+            "--state",  folder_ / "state",       "--log-format", "text"};
+  }
+  std::unique_ptr<DaemonProcess> Start(const std::vector<std::string>& environment = {}) {
+    return std::make_unique<DaemonProcess>("patinad", Arguments(), folder_ / "log", environment);
+  }
+  std::string Log() const { return ReadAll(folder_ / "log"); }
+  static size_t Count(const std::string& text, const std::string& part) {
+    size_t count = 0;
+    for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+      ++count;
+    return count;
+  }
+
+  // Looks again every few milliseconds, for a minute at most.
+  void Until(DaemonProcess* daemon, const std::function<bool()>& condition) {
+    for (int i = 0; i < 6000 && !condition(); ++i)
+      ASSERT_FALSE(daemon->Ended(10)) << "the daemon ended: " << Log();
+    ASSERT_TRUE(condition()) << Log();
+  }
+  void Stop(DaemonProcess* daemon) {
+    daemon->Signal(SIGTERM);
+    ASSERT_TRUE(daemon->Ended(60000)) << Log();
+    EXPECT_EQ(daemon->exit_code(), 0) << Log();
+  }
+
+  // A texture set in the drop folder, as a copy would put it there.
+  void Drop(const std::string& asset, int seed) {
+    const std::string sample = folder_ / ("sample" + std::to_string(seed));
+    ASSERT_EQ(Patina({"sample", "--out", sample, "--size", "32", "--kind", "material", "--seed",
+                      std::to_string(seed)})
+                  .exit_code,
+              0);
+    fs::remove(sample + "/job.json");
+    fs::copy(sample, folder_ / ("drop/" + asset),
+             fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  }
+
+  patina::test::TemporaryDirectory folder_;
+};
+
+TEST_F(DaemonTest, BakesWhatIsDroppedAsTheCommandDoesAndOnlyOnce) {
+  auto daemon = Start();
+  Drop("floor", 1);
+  std::ofstream(folder_ / "drop/bad.bsdf") << "junk";
+  Until(daemon.get(), [&] {
+    return fs::exists(folder_ / "out/floor/current/manifest.json") &&
+           fs::exists(folder_ / "drop/bad.failed.json");
+  });
+  EXPECT_NE(ReadAll(folder_ / "drop/bad.failed.json").find("truncated"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder_ / "out/bad"));
+  Stop(daemon.get());
+
+  ASSERT_EQ(Patina({"bake", folder_ / "drop/floor", "--out", folder_ / "direct"}).exit_code, 0);
+  EXPECT_EQ(Snapshot(folder_ / "out/floor/r0001"), Snapshot(folder_ / "direct/floor/r0001"));
+
+  // A new daemon looks at both and starts nothing; touched files are looked into and found
+  // unchanged; a changed map bakes its asset again.
+  const size_t started = Count(Log(), "job_started");
+  daemon = Start();
+  Until(daemon.get(), [&] { return Count(Log(), "unchanged=true") >= 2; });
+  EXPECT_EQ(Count(Log(), "job_started"), started) << Log();
+  for (const auto& entry : fs::directory_iterator(folder_ / "drop/floor"))
+    fs::last_write_time(entry.path(), fs::file_time_type::clock::now());
+  Until(daemon.get(), [&] { return Count(Log(), "state=succeeded") == 2; });
+  EXPECT_FALSE(fs::exists(folder_ / "out/floor/r0002")) << Log();
+  Drop("floor", 2);
+  Until(daemon.get(), [&] { return fs::exists(folder_ / "out/floor/r0002/manifest.json"); });
+  Until(daemon.get(), [&] { return Count(Log(), "state=succeeded") >= 3; });
+  Stop(daemon.get());
+  EXPECT_EQ(fs::read_symlink(folder_ / "out/floor/current"), "r0002");
+}
+
+TEST_F(DaemonTest, BakesEveryMaterialOfAFolder) {
+  Drop("set", 1);
+  for (const char* maps : {"basecolor", "normal_gl"}) {
+    const std::string stem = folder_ / "drop/set/";
+    fs::copy(stem + "mosaic_floor_" + maps + ".png", stem + "wall_" + maps + ".png");
+  }
+  auto daemon = Start();
+  Until(daemon.get(), [&] {
+    return fs::exists(folder_ / "out/set_mosaic_floor/current/manifest.json") &&
+           fs::exists(folder_ / "out/set_wall/current/manifest.json");
+  });
+  Stop(daemon.get());
+  EXPECT_FALSE(fs::exists(folder_ / "out/set"));
+}
+
+TEST_F(DaemonTest, ASecondOneOnTheSameStateRefusesAndSaysWhoHasIt) {
+  auto daemon = Start();
+  Until(daemon.get(), [&] { return Count(Log(), " ready ") == 1; });
+  DaemonProcess second("patinad", Arguments(), folder_ / "log2");
+  ASSERT_TRUE(second.Ended(60000));
+  EXPECT_EQ(second.exit_code(), 1);
+  EXPECT_NE(ReadAll(folder_ / "log2").find("process \\\"" + std::to_string(daemon->pid())),
+            std::string::npos)
+      << ReadAll(folder_ / "log2");
+  Stop(daemon.get());
+}
+
+TEST_F(DaemonTest, HandsBackWhatDoesNotEndInTimeAndTheNextOneFinishesIt) {
+  std::ofstream(folder_ / "config.json") << R"({"version": 1, "stop_grace_s": 0,
+    "watch": [{"path": "drop", "settle_ms": 50}], "job": {"quality": "reference"}})";
+  auto daemon = Start();
+  Drop("floor", 1);
+  Until(daemon.get(), [&] { return Count(Log(), "job_started") == 1; });
+  Stop(daemon.get());
+  const bool finished = fs::exists(folder_ / "out/floor/current");
+  daemon = Start();
+  Until(daemon.get(), [&] { return fs::exists(folder_ / "out/floor/current/manifest.json"); });
+  Until(daemon.get(), [&] { return Count(Log(), "state=succeeded") == 1; });
+  EXPECT_EQ(Count(Log(), "job_started"), finished ? 1u : 2u) << Log();
+  EXPECT_FALSE(fs::exists(folder_ / "out/floor/r0002"));
+  Stop(daemon.get());
+}
+
+TEST_F(DaemonTest, TellsTheServiceManagerAndReadsItsConfigurationAgain) {
+  const int fd = ::socket(AF_UNIX, SOCK_DGRAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string path = folder_ / "notify";
+  std::memcpy(address.sun_path, path.data(), path.size());
+  ASSERT_EQ(::bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  const auto message = [fd] {
+    pollfd ready{fd, POLLIN, 0};
+    char text[256];
+    ssize_t n = 0;
+    if (::poll(&ready, 1, 60000) == 1) n = ::recv(fd, text, sizeof text, 0);
+    return std::string(text, static_cast<size_t>(n > 0 ? n : 0));
+  };
+  auto daemon = Start({"NOTIFY_SOCKET=" + path});
+  EXPECT_EQ(message(), "READY=1");
+  std::ofstream(folder_ / "config.json") << R"({"version": 1, "cores": -1})";
+  daemon->Signal(SIGHUP);
+  EXPECT_EQ(message().rfind("RELOADING=1\n", 0), 0u);
+  EXPECT_EQ(message(), "READY=1");
+  EXPECT_NE(Log().find("config_problem"), std::string::npos);
+  std::ofstream(folder_ / "config.json") << R"({"version": 1, "limits": {"wall_s": 7}})";
+  daemon->Signal(SIGHUP);
+  EXPECT_EQ(message().rfind("RELOADING=1\n", 0), 0u);
+  EXPECT_EQ(message(), "READY=1");
+  EXPECT_NE(Log().find("reloaded"), std::string::npos);
+  EXPECT_NE(Log().find("config_needs_restart setting=watch"), std::string::npos) << Log();
+  daemon->Signal(SIGTERM);
+  EXPECT_EQ(message(), "STOPPING=1");
+  ASSERT_TRUE(daemon->Ended(60000));
+  EXPECT_EQ(daemon->exit_code(), 0);
+  ::close(fd);
+}
+
+TEST_F(DaemonTest, CommandLineHasTheExitCodesOfTheProgram) {
+  const auto run = [&](const std::vector<std::string>& arguments) {
+    fs::remove(folder_ / "said");
+    DaemonProcess process("patinad", arguments, folder_ / "said");
+    EXPECT_TRUE(process.Ended(60000));
+    return process.exit_code();
+  };
+  EXPECT_EQ(run({"--help"}), 0);
+  EXPECT_NE(ReadAll(folder_ / "said").find("--watch DIR"), std::string::npos);
+  EXPECT_EQ(run({"--version"}), 0);
+  EXPECT_EQ(run({"--frobnicate"}), 2);
+  EXPECT_EQ(run({"--out"}), 2);
+  EXPECT_EQ(run({"stray"}), 2);
+  EXPECT_EQ(run({"--check-config", "--out", folder_ / "o", "--state", folder_ / "s"}), 0);
+  EXPECT_EQ(run({"--check-config", "--watch", folder_ / "none", "--listen", "1.2.3.4:5", "--cores",
+                 "x", "--state", folder_ / "s"}),
+            3);
+  for (const char* what : {"--watch", "--listen", "--cores", "/out", "4 problems"})
+    EXPECT_NE(ReadAll(folder_ / "said").find(what), std::string::npos) << what;
+  EXPECT_EQ(run({"--config", folder_ / "none"}), 3);
+}
+
+}  // namespace
+}  // namespace patina
