@@ -249,6 +249,39 @@ TEST(BakeBrdf, BakesAFolderOfMapsAndBrdfsInOneCommand) {
   EXPECT_THAT(material.err, HasSubstr("patina unpack"));
 }
 
+TEST(BakeBrdf, SharesACodebookAmongMaterialsAndKeepsTheRest) {
+  const TempFolder folder;
+  MakeSamples(folder / "samples");
+  fs::create_directories(folder / "in");
+  fs::copy_file(folder / "samples/brdf/brushed.bin", folder / "in/one.bin");
+  fs::copy_file(folder / "samples/brdf/brushed.bin", folder / "in/two.bin");
+  fs::copy_file(folder / "samples/brdf/sparse.csv", folder / "in/list.csv");
+  Write(folder / "in/cut.bsdf", "tensor_file");
+  const Outcome baked = Patina({"bake", folder / "in", "--out", folder / "out", "--share", "8",
+                                "--quality", "preview", "--json"});
+  EXPECT_EQ(baked.exit_code, 3) << "of the file that is damaged";
+  EXPECT_THAT(baked.err, HasSubstr("cut.bsdf"));
+  std::vector<std::string> codebooks;
+  for (const auto& entry : fs::directory_iterator(folder / "out")) {
+    if (entry.path().extension() == ".hpc") codebooks.push_back(entry.path().filename());
+  }
+  ASSERT_EQ(codebooks.size(), 1u);
+  for (const char* asset : {"one", "two"}) {
+    const Json manifest =
+        Json::parse(ReadAll(folder / ("out/" + std::string(asset) + "/current/manifest.json")));
+    EXPECT_EQ(manifest["brdf"]["codebook"]["file"], codebooks[0]);
+    EXPECT_GT(manifest["quality"]["image_ssim"], 0.8);
+    BrdfDecoder decoder;
+    std::string problem;
+    EXPECT_EQ(BrdfDecoder::Load(folder / ("out/" + std::string(asset)), &decoder, &problem),
+              BrdfDecoder::LoadStatus::kOk)
+        << problem;
+  }
+  const Json list = Json::parse(ReadAll(folder / "out/list/current/manifest.json"));
+  EXPECT_FALSE(list["brdf"].contains("codebook")) << "lists stand alone";
+  EXPECT_FALSE(fs::exists(folder / "out/cut"));
+}
+
 TEST(BakeBrdf, RefusesDamagedFilesByName) {
   TempFolder folder;
   const std::string row = "0,0,1,0,0,1,";
