@@ -52,6 +52,11 @@ brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind) {
 brdf::TrainOptions TrainingOfJob(const Job& job, const brdf::SourceKind& kind) {
   brdf::TrainOptions options = brdf::DefaultTraining(kind);
   options.seed = job.seed;
+  if (job.model.index_training == "softmax") {
+    options.index_training = brdf::IndexTraining::kSoftmax;
+  } else if (job.model.index_training == "clusters_then_softmax") {
+    options.index_training = brdf::IndexTraining::kClustersThenSoftmax;
+  }
   switch (job.quality) {
     case Quality::kPreview:
       options.free_steps /= 2;

@@ -263,6 +263,9 @@ JobModel ReadModel(const Json& object, std::vector<std::string>* problems) {
   if (!interpolation.empty()) model.interpolation = interpolation;
   ReadFlag(&reader, "angle_inputs", &model.angle_inputs);
   ReadFlag(&reader, "canonical_order", &model.canonical_order);
+  std::string training;
+  reader.Choice("index_training", {"clusters", "softmax", "clusters_then_softmax"}, &training);
+  if (!training.empty()) model.index_training = training;
   reader.RefuseUnknown();
   return model;
 }
@@ -338,6 +341,7 @@ std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
   SetIf("interpolation", model.interpolation, &json);
   SetIf("angle_inputs", model.angle_inputs, &json);
   SetIf("canonical_order", model.canonical_order, &json);
+  SetIf("index_training", model.index_training, &json);
   if (job.quality != defaults.quality) json["quality"] = QualityName(job.quality);
   if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
   if (job.seed != defaults.seed) json["seed"] = job.seed;
@@ -360,6 +364,7 @@ std::string CanonicalBrdfJob(const Job& job, nlohmann::ordered_json json) {
                               {"angle_inputs", shape.grid.angle_inputs},
                               {"canonical_order", shape.grid.canonical_order}});
   }
+  json["index_training"] = job.model.index_training.value_or("clusters");
   json["quality"] = QualityName(job.quality);
   json["recipe"] = RecipeName(job.recipe);
   json["seed"] = job.seed;

@@ -41,6 +41,7 @@ struct JobModel {
   std::optional<std::string> interpolation;  // "bilinear", "inverse_distance", "uniform"
   std::optional<bool> angle_inputs;
   std::optional<bool> canonical_order;
+  std::optional<std::string> index_training;  // "clusters", "softmax", "clusters_then_softmax"
 };
 
 enum class JobKind { kMaterial, kBrdf };  // "material", "brdf"

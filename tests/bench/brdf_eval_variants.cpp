@@ -71,7 +71,6 @@ const Variant kVariants[] = {
      [](ModelShape* shape, TrainOptions* options) {
        Plain(64, shape, options);
        options->index_training = brdf::IndexTraining::kSoftmax;
-       options->logit_rate = 0.05f;
      }},
 };
 

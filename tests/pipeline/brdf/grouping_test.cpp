@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "formats/brdf/angles.h"
 #include "pipeline/brdf/batch_evaluator.h"
 #include "pipeline/brdf/train_brdf.h"
 #include "tests/pipeline/brdf/brdf_samples.h"

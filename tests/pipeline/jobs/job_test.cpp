@@ -109,6 +109,7 @@ TEST(ParseJob, ReadsEveryFieldOfTheFullBrdf) {
   EXPECT_EQ(shape.grid.interpolation, Interpolation::kInverseDistance);
   EXPECT_FALSE(shape.grid.angle_inputs);
   EXPECT_FALSE(shape.grid.canonical_order);
+  EXPECT_EQ(TrainingOfJob(*job, {}).index_training, brdf::IndexTraining::kClustersThenSoftmax);
   EXPECT_EQ(job->quality, Quality::kReference);
   EXPECT_EQ(job->seed, 7u);
   EXPECT_EQ(job->threads, 2);
@@ -361,11 +362,12 @@ TEST(JobSchema, AgreesWithTheParser) {
     json.erase(key);
     documents.push_back(json);
   }
-  for (const char* key : {"nside", "primitive_size", "index_bits", "hidden", "hidden_layers",
-                          "interpolation", "angle_inputs", "canonical_order", "unknown"}) {
+  for (const char* key :
+       {"nside", "primitive_size", "index_bits", "hidden", "hidden_layers", "interpolation",
+        "angle_inputs", "canonical_order", "index_training", "unknown"}) {
     for (const Json& value : {Json(0), Json(1), Json(1.5), Json(4), Json(5), Json(12), Json(13),
                               Json(64), Json(65), Json(256), Json(257), Json(-1), Json(true),
-                              Json("bilinear"), Json("cubic"), Json(nullptr)}) {
+                              Json("bilinear"), Json("cubic"), Json("softmax"), Json(nullptr)}) {
       Json json = MinimalBrdf();
       json["model"][key] = value;
       documents.push_back(json);
@@ -418,13 +420,15 @@ TEST(CanonicalJob, NamesTheModelOfABrdf) {
   b.file = "elsewhere.binary";
   b.out = "other";
   b.threads = 3;
-  b.model.nside = ModelOfJob(a, {}).grid.nside;  // what it would be anyway
+  b.model.primitive_size = ModelOfJob(a, {}).primitive_size;  // what it would be anyway
+  b.model.index_training = "clusters";
   EXPECT_EQ(CanonicalJob(a), CanonicalJob(b));
   for (auto change :
        {+[](Job* j) { j->seed = 2; }, +[](Job* j) { j->quality = Quality::kPreview; },
         +[](Job* j) { j->recipe = Recipe::kPaper; }, +[](Job* j) { j->asset = "steel"; },
         +[](Job* j) { j->model.nside = 7; }, +[](Job* j) { j->model.interpolation = "uniform"; },
-        +[](Job* j) { j->model.canonical_order = false; }}) {
+        +[](Job* j) { j->model.canonical_order = false; },
+        +[](Job* j) { j->model.index_training = "softmax"; }}) {
     Job changed = a;
     change(&changed);
     EXPECT_NE(CanonicalJob(a), CanonicalJob(changed));
