@@ -17,6 +17,7 @@
 #include <valijson/validator.hpp>
 #pragma GCC diagnostic pop
 
+#include "formats/base/strict_json.h"
 #include "formats/embedded_schemas.h"
 
 namespace patina {
@@ -47,16 +48,7 @@ std::string PointerOf(const std::vector<std::string>& context) {
   for (size_t i = 1; i < context.size(); ++i) {
     const std::string& part = context[i];
     const bool bracketed = part.size() >= 2 && part.front() == '[' && part.back() == ']';
-    pointer += '/';
-    for (const char c : bracketed ? part.substr(1, part.size() - 2) : part) {
-      if (c == '~') {
-        pointer += "~0";
-      } else if (c == '/') {
-        pointer += "~1";
-      } else {
-        pointer += c;
-      }
-    }
+    pointer += "/" + EscapePointer(bracketed ? part.substr(1, part.size() - 2) : part);
   }
   return pointer;
 }

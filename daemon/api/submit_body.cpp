@@ -3,6 +3,9 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
+
+#include "formats/base/strict_json.h"
 
 namespace patina::daemon {
 namespace {
@@ -13,48 +16,16 @@ constexpr int kDeepest = 24;
 constexpr size_t kMaxProblems = 50;
 constexpr int64_t kMaxLimit = int64_t{1} << 40;
 
-std::string Escaped(const std::string& key) {
-  std::string out;
-  for (const char c : key) {
-    if (c == '~') {
-      out += "~0";
-    } else if (c == '/') {
-      out += "~1";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
-// Parses text, refusing what the library would let through: keys that stand twice, and nesting so
-// deep that the value could not be printed.
+// Parses an object.
 bool Parse(std::string_view text, Json* json, std::vector<FieldProblem>* problems) {
-  std::vector<std::set<std::string>> keys;
-  std::string twice;
-  bool too_deep = false;
-  const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
-    too_deep = too_deep || depth > kDeepest;
-    if (too_deep) return false;
-    if (event == Json::parse_event_t::object_start) {
-      keys.emplace_back();
-    } else if (event == Json::parse_event_t::object_end) {
-      keys.pop_back();
-    } else if (event == Json::parse_event_t::key) {
-      std::string key = parsed.get<std::string>();
-      if (!keys.back().insert(key).second && twice.empty()) twice = std::move(key);
-    }
-    return true;
-  };
-  try {
-    *json = Json::parse(text.begin(), text.end(), watch);
-  } catch (const Json::exception& error) {
-    problems->push_back({"", std::string("not JSON: ") + error.what()});
-    return false;
+  auto parsed = ParseStrictJson(text, kDeepest);
+  if (!parsed) {
+    problems->push_back({"", parsed.error().message});
+  } else if (!parsed->is_object()) {
+    problems->push_back({"", "must be a JSON object"});
+  } else {
+    *json = std::move(*parsed);
   }
-  if (too_deep) problems->push_back({"", "nested deeper than any request is"});
-  if (!twice.empty()) problems->push_back({"", "the key \"" + twice + "\" stands twice"});
-  if (problems->empty() && !json->is_object()) problems->push_back({"", "must be a JSON object"});
   return problems->empty();
 }
 
@@ -71,7 +42,7 @@ class Reader {
 
   void Complain(const std::string& key, const std::string& detail) {
     if (problems_->size() < kMaxProblems)
-      problems_->push_back({pointer_ + "/" + Escaped(key), detail});
+      problems_->push_back({pointer_ + "/" + EscapePointer(key), detail});
   }
 
   std::optional<int64_t> Integer(const char* key, int64_t least, int64_t most) {
@@ -181,7 +152,7 @@ std::vector<FieldProblem> CheckEmptyBody(std::string_view body) {
   if (!Parse(body, &json, &problems)) return problems;
   for (const auto& [key, value] : json.items()) {
     if (problems.size() < kMaxProblems)
-      problems.push_back({"/" + Escaped(key), "is not known; this request has no fields"});
+      problems.push_back({"/" + EscapePointer(key), "is not known; this request has no fields"});
   }
   return problems;
 }

@@ -14,6 +14,7 @@
 #include "daemon/config/config_paths.h"
 #include "formats/base/file_io.h"
 #include "formats/base/names.h"
+#include "formats/base/strict_json.h"
 #include "formats/schema_check.h"
 
 namespace patina::daemon {
@@ -79,12 +80,10 @@ class Loader {
     c.file = AbsolutePath(file, "");
     auto text = ReadTextFile(file, kMaxConfigBytes);
     if (!text) return Complain(file, text.error().message);
-    Json json;
-    try {
-      json = Json::parse(*text);
-    } catch (const Json::exception& error) {
-      return Complain(file, std::string("not JSON: ") + error.what());
-    }
+    constexpr int kDeepest = 16;
+    const auto parsed = ParseStrictJson(*text, kDeepest);
+    if (!parsed) return Complain(file, parsed.error().message);
+    const Json& json = *parsed;
     auto findings = FindSchemaProblems("config", json);
     if (!findings) return Complain(file, findings.error().message);
     for (const SchemaFinding& finding : *findings)

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "formats/base/file_io.h"
+#include "formats/base/strict_json.h"
 #include "pipeline/jobs/brdf_job.h"
 
 namespace patina {
@@ -21,55 +22,10 @@ std::string Shown(const Json& value) {
   return text;
 }
 
-std::string EscapePointer(std::string_view key) {
-  std::string out;
-  for (const char c : key) {
-    if (c == '~') {
-      out += "~0";
-    } else if (c == '/') {
-      out += "~1";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
-// Parses JSON, refusing what the library would let through: a key that stands twice in one object,
-// and nesting so deep that printing the value would exhaust the stack.
 Result<Json> ParseJson(std::string_view text, const std::string& source) {
   constexpr int kDeepest = 16;
-  std::vector<std::set<std::string>> keys;
-  std::string twice;
-  bool too_deep = false;
-  auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
-    too_deep = too_deep || depth > kDeepest;
-    if (too_deep) return false;
-    if (event == Json::parse_event_t::object_start) {
-      keys.emplace_back();
-    } else if (event == Json::parse_event_t::object_end) {
-      keys.pop_back();
-    } else if (event == Json::parse_event_t::key) {
-      std::string key = parsed.get<std::string>();
-      if (!keys.back().insert(key).second && twice.empty()) twice = std::move(key);
-    }
-    return true;
-  };
-  Json json;
-  try {
-    json = Json::parse(text.begin(), text.end(), watch);
-  } catch (const Json::exception& e) {
-    return Fail(ErrorCode::kInvalidArgument, source + ": not JSON: " + e.what());
-  }
-  if (too_deep) {
-    return Fail(
-        ErrorCode::kInvalidArgument,
-        source + ": nested deeper than " + std::to_string(kDeepest) + " levels, which no job is");
-  }
-  if (!twice.empty()) {
-    return Fail(ErrorCode::kInvalidArgument,
-                source + ": the key \"" + twice + "\" stands twice in one object; keep one");
-  }
+  auto json = ParseStrictJson(text, kDeepest);
+  if (!json) return Fail(json.error(), source);
   return json;
 }
 

@@ -171,7 +171,8 @@ TEST_F(ConfigTest, WarnsOfVariablesThatItDoesNotKnow) {
 }
 
 TEST_F(ConfigTest, FilesThatAreNoConfigurationAreProblems) {
-  for (const char* text : {"", "[]", "{", "null", "{\"version\": 1} x"}) {
+  for (const char* text : {"", "[]", "{", "null", "{\"version\": 1} x",
+                           "{\"version\": 1, \"cores\": 1, \"cores\": 2}"}) {
     std::ofstream(folder_ / "c") << text;
     EXPECT_FALSE(LoadConfig(folder_ / "c", {}, flags_).problems.empty()) << text;
   }
