@@ -1,28 +1,20 @@
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <set>
 
 #include "formats/base/file_io.h"
-#include "formats/brdf/brdf_source.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/result_text.h"
-#include "pipeline/jobs/brdf_files.h"
-#include "pipeline/jobs/brdf_run.h"
+#include "pipeline/jobs/brdf_group.h"
 #include "pipeline/jobs/event_log.h"
+#include "pipeline/jobs/job_plan.h"
 #include "pipeline/jobs/job_runner.h"
-#include "pipeline/jobs/job_sets.h"
 
 namespace patina {
 namespace {
-
-// A job, or why there is none.
-struct Planned {
-  std::string asset;
-  Result<Job> job;
-  bool may_share = false;  // a BRDF whose shape no job file has set
-};
 
 template <class Enum, class Parse>
 void Override(const std::optional<std::string>& name, Parse parse, Enum* value) {
@@ -80,76 +72,29 @@ void Apply(const JobOverrides& overrides, Job* job) {
   if (overrides.no_toksvig) job->toksvig = false;
 }
 
-Job BrdfJob(const std::string& asset, const std::string& file) {
-  Job job;
-  job.kind = JobKind::kBrdf;
-  job.asset = asset;
-  job.file = file;
-  return job;
-}
-
-// A file is a BRDF by its extension; a .json by its content, as job files end so, too.
-bool IsBrdfInput(const std::string& path) {
-  std::string extension = std::filesystem::path(path).extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension == ".json" ? IsMeasurementList(path) : brdf::HasBrdfExtension(path);
-}
-
-void PlanFolder(const std::string& folder, const BakeOptions& options, Verbosity verbosity,
-                std::vector<Planned>* plan) {
-  auto found = FindAssets(folder, options.job.out.value_or(""));
-  if (!found) {
-    plan->push_back({AssetNameFromPath(folder), Fail(found.error())});
-    return;
-  }
-  if (verbosity == Verbosity::kVerbose) {
-    for (const std::string& skipped : found->skipped) {
-      std::fprintf(stderr, "patina: %s holds no images and no BRDFs and is passed over\n",
-                   skipped.c_str());
-    }
-  }
-  for (const FoundAsset& asset : found->assets) {
-    if (!asset.problem.empty()) {
-      plan->push_back({asset.asset, Fail(asset.problem_code, asset.problem)});
-      continue;
-    }
-    if (!asset.file.empty()) {
-      plan->push_back({asset.asset, BrdfJob(asset.asset, asset.file), true});
-      continue;
-    }
-    Job job;
-    job.asset = asset.asset;
-    job.folder = asset.folder;
-    job.set = asset.set;
-    plan->push_back({asset.asset, std::move(job)});
-  }
-}
-
-std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
-  std::vector<Planned> plan;
+std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
+  std::vector<PlannedJob> plan;
   for (const std::string& input : options.inputs) {
     std::error_code ignored;
-    if (std::filesystem::is_regular_file(input, ignored)) {
-      if (IsBrdfInput(input)) {
-        const std::string asset = BrdfAssetName(input);
-        plan.push_back({asset, BrdfJob(asset, input), true});
-        continue;
-      }
-      auto job = ReadJobFile(input);
-      const std::string asset = job ? job->asset : AssetNameFromPath(input);
-      plan.push_back({asset, std::move(job)});
-    } else if (!options.map_list.empty()) {
+    if (!options.map_list.empty() && !std::filesystem::is_regular_file(input, ignored)) {
+      // The list says which maps there are: none need be found.
       Job job;
       job.asset = AssetNameFromPath(input);
       job.folder = input;
       plan.push_back({job.asset, std::move(job)});
-    } else {
-      PlanFolder(input, options, verbosity, &plan);
+      continue;
+    }
+    JobPlan found = PlanJobs(input, options.job.out.value_or(""));
+    std::move(found.jobs.begin(), found.jobs.end(), std::back_inserter(plan));
+    if (verbosity != Verbosity::kVerbose) continue;
+    for (const std::string& skipped : found.skipped) {
+      std::fprintf(stderr, "patina: %s holds no images and no BRDFs and is passed over\n",
+                   skipped.c_str());
     }
   }
   if (!options.map_list.empty()) {
     auto maps = ReadMapListFile(options.map_list);
-    for (Planned& planned : plan) {
+    for (PlannedJob& planned : plan) {
       if (!maps) planned.job = Fail(maps.error());
       if (!planned.job) continue;
       if (planned.job->kind == JobKind::kBrdf) {
@@ -162,7 +107,7 @@ std::vector<Planned> Plan(const BakeOptions& options, Verbosity verbosity) {
     }
   }
   std::set<std::string> taken;
-  for (Planned& planned : plan) {
+  for (PlannedJob& planned : plan) {
     if (!planned.job) continue;
     Apply(options.job, &*planned.job);
     if (planned.job->out.empty()) {
@@ -204,15 +149,16 @@ void Print(const JobResult& result, const CommandLine& line) {
 }
 
 // Runs the BRDFs of a plan that may share codebooks.
-void RunShared(const std::vector<Planned>& plan, int share, Verbosity verbosity,
+void RunShared(const std::vector<PlannedJob>& plan, int share, Verbosity verbosity,
                const CancelToken& cancel, std::vector<std::optional<JobResult>>* results) {
   std::vector<Job> jobs;
   std::vector<size_t> place;
   for (size_t i = 0; i < plan.size(); ++i) {
-    if (!plan[i].may_share || !plan[i].job) continue;
+    if (!plan[i].is_brdf_file || !plan[i].job) continue;
     jobs.push_back(*plan[i].job);
     place.push_back(i);
   }
+  if (jobs.empty()) return;
   std::vector<std::unique_ptr<TerminalProgress>> terminals(jobs.size());
   const auto observer = [&](size_t job) -> JobObserver& {
     if (!terminals[job]) {
@@ -242,17 +188,17 @@ int BakeCommand(const CommandLine& line, const CancelToken& cancel) {
     PrintError("--maps describes one material; give one INPUT folder with it");
     return kExitUsage;
   }
-  const std::vector<Planned> plan = Plan(options, line.verbosity);
+  const std::vector<PlannedJob> plan = Plan(options, line.verbosity);
   std::vector<std::optional<JobResult>> shared(plan.size());
   if (options.share > 1) RunShared(plan, options.share, line.verbosity, cancel, &shared);
   std::vector<JobResult> results;
   int worst = kExitDone;
   for (size_t i = 0; i < plan.size(); ++i) {
-    const Planned& planned = plan[i];
+    const PlannedJob& planned = plan[i];
     if (shared[i]) {
       results.push_back(std::move(*shared[i]));
-    } else if (cancel.cancelled() && i > 0) {
-      break;
+    } else if (cancel.cancelled() && !results.empty()) {
+      continue;  // what is shared and behind it may be done
     } else if (planned.job) {
       TerminalProgress progress(stderr, line.verbosity, planned.asset);
       results.push_back(RunJob(*planned.job, progress, cancel));

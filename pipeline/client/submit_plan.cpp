@@ -4,9 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "formats/brdf/brdf_source.h"
-#include "pipeline/jobs/brdf_files.h"
-#include "pipeline/jobs/job_sets.h"
+#include "pipeline/jobs/job_plan.h"
 
 namespace patina {
 namespace {
@@ -47,46 +45,13 @@ PlannedSubmit Unplanned(const std::string& asset, const Error& error) {
   return planned;
 }
 
-Job BrdfJob(const std::string& asset, const std::string& file) {
-  Job job;
-  job.kind = JobKind::kBrdf;
-  job.asset = asset;
-  job.file = file;
-  return job;
-}
-
-bool IsJsonFile(const std::string& path) {
-  std::string extension = fs::path(path).extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension == ".json";
-}
-
 }  // namespace
 
 std::vector<PlannedSubmit> PlanSubmit(const std::string& input, const SubmitSettings& settings) {
-  std::error_code ignored;
-  if (fs::is_regular_file(input, ignored)) {
-    const bool brdf = IsJsonFile(input) ? IsMeasurementList(input) : brdf::HasBrdfExtension(input);
-    if (brdf) return {Plan(BrdfJob(BrdfAssetName(input), input), settings)};
-    auto job = ReadJobFile(input);
-    if (!job) return {Unplanned(AssetNameFromPath(input), job.error())};
-    return {Plan(std::move(*job), settings)};
-  }
-  auto found = FindAssets(input, settings.out);
-  if (!found) return {Unplanned(AssetNameFromPath(input), found.error())};
   std::vector<PlannedSubmit> plan;
-  for (const FoundAsset& asset : found->assets) {
-    if (!asset.problem.empty()) {
-      plan.push_back(Unplanned(asset.asset, {asset.problem_code, asset.problem}));
-    } else if (!asset.file.empty()) {
-      plan.push_back(Plan(BrdfJob(asset.asset, asset.file), settings));
-    } else {
-      Job job;
-      job.asset = asset.asset;
-      job.folder = asset.folder;
-      job.set = asset.set;
-      plan.push_back(Plan(std::move(job), settings));
-    }
+  for (PlannedJob& planned : PlanJobs(input, settings.out).jobs) {
+    plan.push_back(planned.job ? Plan(std::move(*planned.job), settings)
+                               : Unplanned(planned.asset, planned.job.error()));
   }
   return plan;
 }

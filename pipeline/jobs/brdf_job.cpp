@@ -26,13 +26,8 @@ const char* InterpolationName(Interpolation interpolation) {
 }
 
 brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind) {
-  brdf::ModelShape shape = brdf::DefaultShape(kind);
-  if (job.recipe == Recipe::kPaper) {
-    shape.grid.nside = 64;
-    shape.hidden = 64;
-    shape.grid.angle_inputs = false;
-    shape.grid.canonical_order = false;
-  }
+  brdf::ModelShape shape =
+      job.recipe == Recipe::kPaper ? brdf::PaperShape(kind) : brdf::DefaultShape(kind);
   const JobModel& model = job.model;
   Override(model.nside, &shape.grid.nside);
   Override(model.primitive_size, &shape.primitive_size);
@@ -50,7 +45,8 @@ brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind) {
 }
 
 brdf::TrainOptions TrainingOfJob(const Job& job, const brdf::SourceKind& kind) {
-  brdf::TrainOptions options = brdf::DefaultTraining(kind);
+  brdf::TrainOptions options =
+      job.recipe == Recipe::kPaper ? brdf::PaperTraining() : brdf::DefaultTraining(kind);
   options.seed = job.seed;
   if (job.model.index_training == "softmax") {
     options.index_training = brdf::IndexTraining::kSoftmax;

@@ -21,8 +21,7 @@ inline constexpr int kMaxJobHiddenLayers = 4;
 
 const char* InterpolationName(Interpolation interpolation);  // as in job files and manifests
 
-// The model's shape: the recipe's, with what the job says in its place. Recipe::kPaper is the plain
-// model: Nside 64, 64 hidden units, neither angle inputs nor canonical order.
+// The model's shape: the recipe's, with what the job says in its place.
 brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind);
 
 // Steps by quality: fewer for preview, three times those of standard for reference.

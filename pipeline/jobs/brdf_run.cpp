@@ -5,9 +5,7 @@
 #include <filesystem>
 
 #include "formats/base/file_io.h"
-#include "pipeline/brdf/grouping.h"
 #include "pipeline/jobs/brdf_job.h"
-#include "pipeline/jobs/brdf_package.h"
 #include "pipeline/jobs/measure_brdf.h"
 #include "pipeline/jobs/package.h"
 #include "pipeline/jobs/staged_run.h"
@@ -23,19 +21,11 @@ std::string Format(const char* format, Args... args) {
                : std::string();
 }
 
-// What a group of jobs was trained to.
-struct GroupTraining {
-  brdf::TrainedBrdf model;
-  SharedCodebook codebook;
-  std::string sha256;              // of the file that was trained
-  std::vector<std::string> group;  // and of all of them
-};
-
 class BrdfRun : public StagedRun {
  public:
   // trained: null to train alone; must outlive the run.
-  BrdfRun(const Job& job, JobObserver& observer, const CancelToken& cancel,
-          const RunGuards& guards, const GroupTraining* trained)
+  BrdfRun(const Job& job, JobObserver& observer, const CancelToken& cancel, const RunGuards& guards,
+          TrainedInGroup* trained)
       : StagedRun(job, observer, cancel, guards), trained_(trained) {}
 
  private:
@@ -52,16 +42,13 @@ class BrdfRun : public StagedRun {
   Status Ingest() {
     PATINA_TRY(ChooseSimdTarget());
     reading_input_ = true;
-    PATINA_ASSIGN(source_, ReadBrdfSource(job_));
-    reading_input_ = false;
     if (trained_ != nullptr) {
-      if (source_.sha256 != trained_->sha256) {
-        return Fail(ErrorCode::kConflict, job_.file +
-                                              ": it changed while its group was trained; "
-                                              "bake again when it is complete");
-      }
+      source_ = std::move(trained_->source);
       source_.fingerprint = BrdfFingerprint(job_, source_.sha256, trained_->group);
+    } else {
+      PATINA_ASSIGN(source_, ReadBrdfSource(job_));
     }
+    reading_input_ = false;
     result_.fingerprint = source_.fingerprint;
     const brdf::Source& data = source_.data;
     for (const std::string& warning : data.warnings) sink_.OnWarning(warning);
@@ -76,7 +63,7 @@ class BrdfRun : public StagedRun {
 
   Status Train() {
     if (trained_ != nullptr) {
-      model_ = trained_->model;
+      model_ = std::move(trained_->model);
       return Trained();
     }
     const brdf::SourceKind kind = brdf::KindOf(source_.data);
@@ -172,86 +159,17 @@ class BrdfRun : public StagedRun {
     return curve;
   }
 
-  const GroupTraining* trained_;
+  TrainedInGroup* trained_;
   BrdfSource source_;
   brdf::TrainedBrdf model_;
   BrdfMeasurement measurement_;
 };
 
-void TrainGroup(std::span<const Job> jobs, const std::vector<BrdfSource>& sources,
-                const std::vector<size_t>& job_of_source, const std::vector<size_t>& group,
-                JobObserver& observer, const CancelToken& cancel,
-                std::vector<std::optional<GroupTraining>>* trained) {
-  const Job& first = jobs[job_of_source[group[0]]];
-  std::vector<const brdf::Source*> data;
-  std::vector<std::string> hashes;
-  std::string names;
-  for (const size_t member : group) {
-    data.push_back(&sources[member].data);
-    hashes.push_back(sources[member].sha256);
-    names += (names.empty() ? "" : ", ") + jobs[job_of_source[member]].asset;
-  }
-  observer.OnNote("group", std::to_string(group.size()) + " materials on one codebook: " + names);
-  const brdf::SourceKind kind = brdf::KindOf(*data[0]);
-  brdf::TrainOptions options = TrainingOfJob(first, kind);
-  options.cancel = &cancel;
-  std::vector<std::string> warnings;
-  StageSink sink(observer, &warnings);
-  sink.SetStage("train");
-  ThreadPool pool(first.threads);
-  auto models = brdf::TrainShared(data, ModelOfJob(first, kind), options, pool, sink);
-  if (!models) return;
-  const Status folder = MakeDirectories(first.out);
-  auto shared = folder ? WriteSharedCodebook((*models)[0], first.out)
-                       : Result<SharedCodebook>(Fail(folder.error()));
-  if (!shared) {
-    observer.OnWarning(shared.error().message + "; each material gets a codebook of its own");
-    return;
-  }
-  for (size_t m = 0; m < group.size(); ++m) {
-    const size_t member = group[m];
-    (*trained)[job_of_source[member]] =
-        GroupTraining{std::move((*models)[m]), *shared, sources[member].sha256, hashes};
-  }
-}
-
 }  // namespace
 
 JobResult RunBrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
-                     const RunGuards& guards) {
-  return BrdfRun(job, observer, cancel, guards, nullptr).Run();
-}
-
-std::vector<JobResult> RunSharedBrdfJobs(std::span<const Job> jobs, size_t share,
-                                         const std::function<JobObserver&(size_t)>& observer,
-                                         const CancelToken& cancel) {
-  // Files that cannot be read, or groups that cannot be trained, come to the same error when their
-  // job runs alone.
-  std::vector<BrdfSource> sources;
-  std::vector<size_t> job_of_source;
-  for (size_t i = 0; i < jobs.size(); ++i) {
-    auto source = ReadBrdfSource(jobs[i]);
-    if (!source) continue;
-    sources.push_back(std::move(*source));
-    job_of_source.push_back(i);
-  }
-  std::vector<const brdf::Source*> data;
-  for (const BrdfSource& source : sources) data.push_back(&source.data);
-  std::vector<std::optional<GroupTraining>> trained(jobs.size());
-  for (const std::vector<size_t>& group : brdf::GroupAlike(data, share)) {
-    if (group.size() < 2 || cancel.cancelled()) continue;
-    TrainGroup(jobs, sources, job_of_source, group, observer(job_of_source[group[0]]), cancel,
-               &trained);
-  }
-  sources.clear();
-  std::vector<JobResult> results;
-  for (size_t i = 0; i < jobs.size(); ++i) {
-    if (cancel.cancelled() && i > 0) break;
-    results.push_back(
-        BrdfRun(jobs[i], observer(i), cancel, {}, trained[i] ? &*trained[i] : nullptr).Run());
-    observer(i).OnResult(results.back());
-  }
-  return results;
+                     const RunGuards& guards, TrainedInGroup* trained) {
+  return BrdfRun(job, observer, cancel, guards, trained).Run();
 }
 
 }  // namespace patina

@@ -97,6 +97,23 @@ TEST(ParseJob, ReadsTheMinimalBrdfWithTheRecipesModel) {
   EXPECT_FALSE(plain.grid.canonical_order);
 }
 
+TEST(ModelOfJob, ThePapersIsTheSameForEverySource) {
+  Job job;
+  job.kind = JobKind::kBrdf;
+  job.recipe = Recipe::kPaper;
+  for (const brdf::SourceKind kind : {brdf::SourceKind{true, false}, brdf::SourceKind{false, false},
+                                      brdf::SourceKind{false, true}}) {
+    const brdf::ModelShape shape = ModelOfJob(job, kind);
+    EXPECT_EQ(shape.grid.isotropic, kind.isotropic);
+    EXPECT_FALSE(shape.grid.half_vector_inputs);
+    EXPECT_EQ(shape.grid.nside, 64);
+    EXPECT_EQ(shape.index_bits, 9);
+    EXPECT_EQ(shape.hidden, 64);
+    EXPECT_EQ(shape.hidden_layers, 2);
+    EXPECT_EQ(TrainingOfJob(job, kind).decay, 0.0f);
+  }
+}
+
 TEST(ParseJob, ReadsEveryFieldOfTheFullBrdf) {
   auto job = ReadJobFile(Example("job_brdf_full.json"));
   ASSERT_TRUE(job) << job.error().message;

@@ -1,0 +1,62 @@
+#include "pipeline/jobs/job_plan.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "formats/brdf/brdf_source.h"
+#include "pipeline/image/map_name.h"
+#include "pipeline/jobs/brdf_files.h"
+#include "pipeline/jobs/job_sets.h"
+
+namespace patina {
+namespace {
+
+PlannedJob PlanBrdf(const std::string& asset, const std::string& file) {
+  Job job;
+  job.kind = JobKind::kBrdf;
+  job.asset = asset;
+  job.file = file;
+  return {asset, std::move(job), true};
+}
+
+// A file is a BRDF by its extension; a .json by its content, as job files end so, too.
+bool IsBrdf(const std::string& path) {
+  return LowerExtension(path) == ".json" ? IsMeasurementList(path) : brdf::HasBrdfExtension(path);
+}
+
+PlannedJob Plan(const FoundAsset& found) {
+  if (!found.problem.empty()) return {found.asset, Fail(found.problem_code, found.problem)};
+  if (!found.file.empty()) return PlanBrdf(found.asset, found.file);
+  Job job;
+  job.asset = found.asset;
+  job.folder = found.folder;
+  job.set = found.set;
+  return {found.asset, std::move(job)};
+}
+
+}  // namespace
+
+JobPlan PlanJobs(const std::string& input, const std::string& except) {
+  JobPlan plan;
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(input, ignored)) {
+    if (IsBrdf(input)) {
+      plan.jobs.push_back(PlanBrdf(BrdfAssetName(input), input));
+      return plan;
+    }
+    auto job = ReadJobFile(input);
+    const std::string asset = job ? job->asset : AssetNameFromPath(input);
+    plan.jobs.push_back({asset, std::move(job)});
+    return plan;
+  }
+  auto found = FindAssets(input, except);
+  if (!found) {
+    plan.jobs.push_back({AssetNameFromPath(input), Fail(found.error())});
+    return plan;
+  }
+  for (const FoundAsset& asset : found->assets) plan.jobs.push_back(Plan(asset));
+  plan.skipped = std::move(found->skipped);
+  return plan;
+}
+
+}  // namespace patina
