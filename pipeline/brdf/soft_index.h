@@ -39,9 +39,8 @@ class SoftIndex {
   // The indices of all corners that have logits.
   void WriteIndices(std::span<int32_t> index) const;
 
-  float* LogitsOfRow(size_t row) { return logits_.data() + row * columns_; }
-
  private:
+  float* LogitsOfRow(size_t row) { return logits_.data() + row * columns_; }
   int32_t Largest(size_t row) const;
 
   std::vector<int32_t> corners_;  // of each row

@@ -72,8 +72,7 @@ class Session {
     held_out_ = std::min(kHeldOut, samples_.size() / 8);
     train_count_ = samples_.size() - held_out_;
     CountUsage();
-    // Twice as many materials get half as many steps more.
-    const double growth = 0.5 + 0.5 * materials_;
+    const double growth = 0.5 * (materials_ + 1);
     const int total = static_cast<int>(growth * (options_.free_steps + options_.codebook_steps));
     const bool has_free_part = options_.index_training != IndexTraining::kSoftmax;
     const int free_steps = has_free_part ? static_cast<int>(growth * options_.free_steps) : 0;
@@ -388,6 +387,21 @@ ModelShape DefaultShape(const SourceKind& kind) {
   return shape;
 }
 
+ModelShape PaperShape(const SourceKind& kind) {
+  ModelShape shape;
+  shape.grid.isotropic = kind.isotropic;
+  shape.grid.nside = 64;
+  shape.grid.angle_inputs = shape.grid.canonical_order = false;
+  shape.hidden = 64;
+  return shape;
+}
+
+TrainOptions PaperTraining() {
+  TrainOptions options;
+  options.decay = 0;
+  return options;
+}
+
 TrainOptions DefaultTraining(const SourceKind& kind) {
   TrainOptions options;
   if (kind.list) {
@@ -399,9 +413,6 @@ TrainOptions DefaultTraining(const SourceKind& kind) {
     options.half_angle_share = 0.7;
     options.free_steps = options.codebook_steps = 12000;
     options.decay = 0.2f;
-  } else {
-    // Narrow peaks need large weights: 0.1 adds a quarter to the error of glossy tables.
-    options.decay = 0.02f;
   }
   return options;
 }

@@ -19,12 +19,13 @@ struct Variant {
   void (*apply)(ModelShape* shape, TrainOptions* options);
 };
 
-// The paper's model: neither scalars nor order.
+// The paper's model, at another Nside.
 void Plain(int nside, ModelShape* shape, TrainOptions* options) {
-  shape->grid.angle_inputs = shape->grid.half_vector_inputs = shape->grid.canonical_order = false;
+  *shape = brdf::PaperShape({shape->grid.isotropic, false});
   shape->grid.nside = nside;
-  shape->hidden = 64;
-  options->decay = 0;
+  const uint64_t seed = options->seed;
+  *options = brdf::PaperTraining();
+  options->seed = seed;
 }
 
 const Variant kVariants[] = {
