@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <set>
+#include <shared_mutex>
 #include <vector>
 
 #include "daemon/base/clock.h"
@@ -60,7 +61,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
   AssetSource* source() override { return this; }
 
   WatchHealth Health() const override {
-    const std::lock_guard lock(mutex_);
+    const std::shared_lock lock(mutex_);
     WatchHealth health;
     for (const auto& watcher : watchers_) {
       const WatchStatus status = watcher->status();
@@ -84,7 +85,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
   }
 
   std::vector<PendingAsset> Pending() const override {
-    const std::lock_guard lock(mutex_);
+    const std::shared_lock lock(mutex_);
     std::vector<PendingAsset> pending;
     for (const auto& watcher : watchers_) {
       for (const WatchedAsset& asset : watcher->assets()) {
@@ -98,7 +99,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
   }
 
   void RequestRescan() override {
-    const std::lock_guard lock(mutex_);
+    const std::shared_lock lock(mutex_);
     for (const auto& watcher : watchers_) watcher->RequestRescan();
   }
 
@@ -194,7 +195,9 @@ class WatchedFolders : public DropFolders, public AssetSource {
 
   Service& service_;
   Logger& log_;
-  mutable std::mutex mutex_;
+  // Shared by those who ask: a list of assets that waits for a disk must not keep back a look at
+  // the health.
+  mutable std::shared_mutex mutex_;
   std::vector<std::unique_ptr<Watcher>> watchers_;
   std::mutex offered_mutex_;
   std::map<std::string, std::set<std::string>> offered_;  // path -> names of assets

@@ -64,16 +64,17 @@ class LocalExecutor : public Executor {
     inotify_ = UniqueFd(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK));
     if (inotify_) Listen(inotify_.get());
     if (options_.sandbox == LocalExecutorOptions::Sandbox::kOff) return {};
-    if (Sandbox::LandlockVersion() > 0) {
-      use_sandbox_ = true;
-      return {};
-    }
+    use_sandbox_ = true;
+    if (Sandbox::LandlockVersion() > 0) return {};
     if (options_.sandbox == LocalExecutorOptions::Sandbox::kRequired) {
       return Fail(ErrorCode::kUnsupported,
                   "this kernel has no Landlock, and the configuration requires a sandbox; boot "
                   "with lsm=...,landlock, or set \"sandbox\" to \"auto\"");
     }
-    log_.Warning("no_sandbox", {{"reason", "this kernel has no Landlock"}});
+    log_.Warning("half_a_sandbox",
+                 {{"reason",
+                   "this kernel has no Landlock: jobs are kept from sockets and the like, "
+                   "but not from files"}});
     return {};
   }
 

@@ -90,16 +90,18 @@ constexpr uint32_t kRefused[] = {
     SYS_clock_settime,
 };
 constexpr size_t kRefusedCount = sizeof kRefused / sizeof *kRefused;
+constexpr uint32_t kX32 = 0x40000000;  // the same calls by other numbers, where the kernel has them
 
 int Filter() {
   // Load the architecture, load the number, compare with each; no allocation, as this runs after
   // the fork.
-  sock_filter program[6 + kRefusedCount + 1];
+  sock_filter program[7 + kRefusedCount];
   size_t n = 0;
   program[n++] = BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch));
   program[n++] = BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, AUDIT_ARCH_X86_64, 1, 0);
   program[n++] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS);
   program[n++] = BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr));
+  program[n++] = BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, kX32, kRefusedCount + 1, 0);
   for (size_t i = 0; i < kRefusedCount; ++i) {
     const auto to_refusal = static_cast<uint8_t>(kRefusedCount - i);
     program[n++] = BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kRefused[i], to_refusal, 0);
@@ -123,8 +125,7 @@ int Sandbox::LandlockVersion() {
 
 Result<Sandbox> Sandbox::Create(const SandboxPaths& paths) {
   const int version = LandlockVersion();
-  if (version == 0)
-    return Fail(ErrorCode::kUnsupported, "this kernel has no Landlock, or it is turned off");
+  if (version == 0) return Sandbox(UniqueFd());
   uint64_t everything = kFirstVersion;
   if (version >= 2) everything |= kRefer;
   if (version >= 3) everything |= kTruncate;
@@ -144,7 +145,7 @@ Result<Sandbox> Sandbox::Create(const SandboxPaths& paths) {
 }
 
 int Sandbox::Apply() const {
-  if (::syscall(SYS_landlock_restrict_self, ruleset_.get(), 0) != 0) return errno;
+  if (ruleset_ && ::syscall(SYS_landlock_restrict_self, ruleset_.get(), 0) != 0) return errno;
   return Filter();
 }
 

@@ -23,7 +23,7 @@ class Sandbox {
   // The version of Landlock that the kernel has; 0: none.
   static int LandlockVersion();
 
-  // Errors: kUnsupported (the kernel has no Landlock), kIo.
+  // Without Landlock in the kernel: the filter alone, and the paths are not looked at. Errors: kIo.
   static Result<Sandbox> Create(const SandboxPaths& paths);
 
   // For the child, between fork and exec, once it can gain no privileges: Landlock, and a filter
@@ -33,7 +33,7 @@ class Sandbox {
 
  private:
   explicit Sandbox(UniqueFd ruleset) : ruleset_(std::move(ruleset)) {}
-  UniqueFd ruleset_;
+  UniqueFd ruleset_;  // none: no Landlock
 };
 
 }  // namespace patina::daemon

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <map>
 #include <mutex>
+#include <shared_mutex>
 #include <thread>
 
 #include "daemon/base/unique_fd.h"
@@ -486,12 +487,12 @@ class RealService : public DaemonService {
   }
 
   std::vector<PendingAsset> Pending() {
-    const std::lock_guard lock(source_mutex_);
+    const std::shared_lock lock(source_mutex_);
     return source_ != nullptr ? source_->Pending() : std::vector<PendingAsset>();
   }
 
   WatchHealth Health() {
-    const std::lock_guard lock(source_mutex_);
+    const std::shared_lock lock(source_mutex_);
     return source_ != nullptr ? source_->Health() : WatchHealth();
   }
 
@@ -504,7 +505,8 @@ class RealService : public DaemonService {
   Scheduler scheduler_;
   std::atomic<bool> draining_{false};
   std::mutex offers_;
-  std::mutex source_mutex_;
+  // Shared by those who ask, as a list of assets may wait for a disk.
+  std::shared_mutex source_mutex_;
   AssetSource* source_ = nullptr;
   std::thread thread_;
 };

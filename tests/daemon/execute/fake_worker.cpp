@@ -12,7 +12,7 @@
 //   child       leaves a process behind that does not end by itself
 //   memory N    takes N MB, and says whether it got them
 //   cpu         uses CPU time for ever
-//   reach PATH  tries to read PATH, to write beside its output, and to open a socket
+//   reach PATH  tries to read PATH, to write beside its output, and to open a socket in two ways
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -195,6 +195,8 @@ class Worker {
       tell("file", std::ifstream(argument).good());
       tell("out", std::ofstream(job_.out + "/stray").good());
       tell("socket", ::socket(AF_UNIX, SOCK_STREAM, 0) >= 0);
+      ::syscall(0x40000000 | SYS_socket, AF_UNIX, SOCK_STREAM, 0);
+      tell("x32", errno != EPERM);
       tell("privileges", ::prctl(PR_GET_NO_NEW_PRIVS, 0, 0, 0, 0) != 1);
     }
     return std::nullopt;

@@ -181,9 +181,18 @@ TEST_F(LocalExecutorTest, KeepsAJobToItsInputAndOutput) {
   Start(spec);
   const AttemptReport report = UntilEnded();
   EXPECT_EQ(report.exit_code, 0) << Log();
-  for (const char* what : {"file refused", "out refused", "socket refused", "privileges refused"})
+  for (const char* what : {"file refused", "out refused"})
     EXPECT_NE(report.result_json.find(what), std::string::npos) << what << report.result_json;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out/stray"));
+}
+
+TEST_F(LocalExecutorTest, KeepsAJobFromSocketsAndPrivileges) {
+  AttemptSpec spec = Prepare("reach " + (folder_ / "nothing"));
+  Start(spec);
+  const AttemptReport report = UntilEnded();
+  EXPECT_EQ(report.exit_code, 0) << Log();
+  for (const char* what : {"socket refused", "x32 refused", "privileges refused"})
+    EXPECT_NE(report.result_json.find(what), std::string::npos) << what << report.result_json;
 }
 
 TEST_F(LocalExecutorTest, AWorkerThatIsNotThereIsAnError) {

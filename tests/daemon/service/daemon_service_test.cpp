@@ -1,5 +1,9 @@
 #include "daemon/service/daemon_service.h"
 
+#include <chrono>
+#include <future>
+#include <vector>
+
 #include "formats/base/file_io.h"
 #include "tests/daemon/service/service_support.h"
 
@@ -455,6 +459,33 @@ TEST_F(ServiceAssets, KeepAsManyRevisionsAsAreConfigured) {
     EXPECT_EQ(std::filesystem::exists(folder_ / ("out/wall/r000" + std::to_string(i))), i > 2) << i;
   }
   EXPECT_EQ(service_->GetMetrics()->revisions_pruned, 2);
+}
+
+// A watcher whose list of assets waits for a disk.
+class StuckSource : public AssetSource {
+ public:
+  std::vector<PendingAsset> Pending() const override {
+    asked_.set_value();
+    released_.get_future().wait();
+    return {};
+  }
+  WatchHealth Health() const override { return {}; }
+  void RequestRescan() override {}
+
+  mutable std::promise<void> asked_, released_;
+};
+
+TEST_F(ServiceAssets, AListThatWaitsForADiskDoesNotKeepBackTheMetrics) {
+  StuckSource source;
+  service_->AttachSource(&source);
+  auto status = std::async(std::launch::async, [&] { return service_->GetStatus().has_value(); });
+  source.asked_.get_future().wait();
+  auto metrics = std::async(std::launch::async, [&] { return service_->GetMetrics().has_value(); });
+  EXPECT_EQ(metrics.wait_for(std::chrono::seconds(30)), std::future_status::ready);
+  source.released_.set_value();
+  EXPECT_TRUE(status.get());
+  EXPECT_TRUE(metrics.get());
+  service_->AttachSource(nullptr);
 }
 
 TEST_F(ServiceAssets, NamesThatJobsCannotHoldAreRefusedWithAReason) {
