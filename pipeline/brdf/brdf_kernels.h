@@ -24,6 +24,7 @@ inline constexpr int kChunkRows = 128;
 inline constexpr int kMaxExtraInputs = 5;
 inline constexpr int kOutputs = 3;  // y of red, green, blue; f = exp(y) - 1
 inline constexpr float kMaxLogValue = 12.0f;
+inline constexpr float kMaxValue = 162753.79f;  // f at that y
 
 constexpr int PadTo16(int n) { return (n + 15) / 16 * 16; }
 

@@ -15,7 +15,9 @@ constexpr int kSamplesPerTask = 4096;
 
 void FillValue(const float rgb[3], float weight, const Direction& wi, const Direction& wo,
                PoolSample* sample) {
-  for (int c = 0; c < 3; ++c) sample->value[c] = rgb[c];
+  // A value that no output can reach would pull outputs up for ever, and with them whatever shares
+  // their features: mirrors grew ghost highlights.
+  for (int c = 0; c < 3; ++c) sample->value[c] = std::min(rgb[c], kMaxValue);
   sample->cosine = std::max(wi.z, wo.z);
   sample->importance = weight;
 }

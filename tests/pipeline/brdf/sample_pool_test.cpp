@@ -200,6 +200,25 @@ TEST(SamplePool, IsTheSameForAnyNumberOfThreadsAndLeavesOutWhatIsInvalid) {
   }
 }
 
+// Beyond the cap of the outputs a wish can't be met, and outputs would grow for ever.
+TEST(SamplePool, AsksForNothingThatNoOutputReaches) {
+  const Source source = SourceOf([](const Direction&, const Direction&, float* rgb) {
+    rgb[0] = 1e9f, rgb[1] = kMaxValue, rgb[2] = 1;
+    return true;
+  });
+  PoolOptions options;
+  options.count = 100;
+  ThreadPool pool(1);
+  const auto samples = DrawPool(source, {}, options, pool);
+  ASSERT_EQ(samples.size(), 100u);
+  for (size_t s = 0; s < samples.size(); ++s) {
+    EXPECT_EQ(samples[s].value[0], kMaxValue);
+    EXPECT_EQ(samples[s].value[1], kMaxValue);
+    EXPECT_EQ(samples[s].value[2], 1);
+  }
+  EXPECT_NEAR(std::log1p(kMaxValue), kMaxLogValue, 1e-6f);
+}
+
 TEST(SamplePool, OfATableWithoutDataIsEmpty) {
   const Source source = SourceOf([](const Direction&, const Direction&, float*) { return false; });
   ThreadPool pool(1);
