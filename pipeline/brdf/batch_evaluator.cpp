@@ -71,32 +71,80 @@ Result<BatchEvaluator> BatchEvaluator::Create(const IndexPack& pack,
     std::copy_n(features.data() + c * pack.primitive_size, pack.primitive_size,
                 evaluator.features_.data() + c * layout.feature_stride);
   }
+  evaluator.FoldFirstLayer();
   return evaluator;
 }
 
-BatchEvaluator::Scratch::Scratch(const BatchEvaluator& evaluator)
-    : chunk_(evaluator.layout()), samples_(kChunkRows) {}
+void BatchEvaluator::FoldFirstLayer() {
+  constexpr size_t kMostFloats = size_t{1} << 19;  // 2 MB
+  const DenseLayer& first = layout_->layers[0];
+  const size_t stride = layout_->feature_stride, corners = features_.size() / stride,
+               columns = first.outputs;
+  if (corners * columns > kMostFloats) return;
+  folded_.Reset(corners * columns);
+  for (size_t c = 0; c < corners; ++c) {
+    const size_t side = c < corners / 2 ? 0 : 1;
+    for (size_t k = 0; k < stride; ++k) {
+      const float feature = features_[c * stride + k];
+      const float* weights = parameters_.data() + first.weights + (side * stride + k) * columns;
+      for (size_t n = 0; n < columns; ++n) folded_[c * columns + n] += feature * weights[n];
+    }
+  }
+  features_.Reset(0);
+}
 
-void BatchEvaluator::Evaluate(Scratch* scratch, size_t count, const Direction* wi,
-                              const Direction* wo, float* rgb) const {
+BatchEvaluator::Scratch::Scratch(const BatchEvaluator& evaluator)
+    : chunk_(evaluator.layout()),
+      pairs_(1),
+      samples_(evaluator.folded_.size() > 0 ? 0 : kChunkRows) {}
+
+void BatchEvaluator::LookUp(const Direction* wi, const Direction* wo, int count,
+                            PairLookups* pairs) const {
+  if (grid_.interpolation == healpix::Interpolation::kBilinear) {
+    const LookUpGrid grid = {grid_.nside,           grid_.corners(),    grid_.isotropic,
+                             grid_.canonical_order, grid_.angle_inputs, grid_.half_vector_inputs};
+    kernels_->look_up_pairs(grid, wi, wo, count, pairs);
+    return;
+  }
+  for (int s = 0; s < kChunkRows; ++s) {
+    const int pair = s < count ? s : 0;
+    PoolSample sample = {};
+    LookUpPair(grid_, wi[pair], wo[pair], &sample);
+    for (int c = 0; c < 8; ++c) pairs->corner[c][s] = sample.corner[c];
+    for (int c = 0; c < 8; ++c) pairs->weight[c][s] = sample.weight[c];
+    for (int e = 0; e < kMaxExtraInputs; ++e) pairs->extra[e][s] = sample.extra[e];
+  }
+}
+
+void BatchEvaluator::ForwardUnfolded(int count, Scratch* scratch) const {
+  const PairLookups& pairs = scratch->pairs_[0];
+  for (int s = 0; s < count; ++s) {
+    PoolSample& sample = scratch->samples_[s];
+    for (int c = 0; c < 8; ++c) sample.corner[c] = pairs.corner[c][s];
+    for (int c = 0; c < 8; ++c) sample.weight[c] = pairs.weight[c][s];
+    for (int e = 0; e < kMaxExtraInputs; ++e) sample.extra[e] = pairs.extra[e][s];
+  }
   ChunkTask task;
   task.layout = layout_.get();
   task.parameters = parameters_.data();
   task.features = features_.data();
   task.samples = scratch->samples_.data();
+  task.count = count;
+  kernels_->forward_chunk(task, &scratch->chunk_);
+}
+
+void BatchEvaluator::Evaluate(Scratch* scratch, size_t count, const Direction* wi,
+                              const Direction* wo, float* rgb) const {
   for (size_t first = 0; first < count; first += kChunkRows) {
-    task.count = static_cast<int>(std::min<size_t>(kChunkRows, count - first));
-    PoolSample* samples = scratch->samples_.data();
-    if (grid_.interpolation == healpix::Interpolation::kBilinear) {
-      const LookUpGrid grid = {grid_.nside,           grid_.corners(),    grid_.isotropic,
-                               grid_.canonical_order, grid_.angle_inputs, grid_.half_vector_inputs};
-      kernels_->look_up_pairs(grid, wi + first, wo + first, task.count, samples);
+    const int used = static_cast<int>(std::min<size_t>(kChunkRows, count - first));
+    LookUp(wi + first, wo + first, used, &scratch->pairs_[0]);
+    if (folded_.size() > 0) {
+      kernels_->evaluate_chunk(*layout_, parameters_.data(), folded_.data(), scratch->pairs_[0],
+                               &scratch->chunk_);
     } else {
-      for (int s = 0; s < task.count; ++s)
-        LookUpPair(grid_, wi[first + s], wo[first + s], &samples[s]);
+      ForwardUnfolded(used, scratch);
     }
-    kernels_->forward_chunk(task, &scratch->chunk_);
-    kernels_->output_values(scratch->chunk_.outputs.data(), wi + first, wo + first, task.count,
+    kernels_->output_values(scratch->chunk_.outputs.data(), wi + first, wo + first, used,
                             rgb + first * kOutputs);
   }
 }

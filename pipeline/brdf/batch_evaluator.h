@@ -23,7 +23,8 @@ class BatchEvaluator {
    private:
     friend class BatchEvaluator;
     ChunkScratch chunk_;
-    AlignedBuffer<PoolSample> samples_;
+    AlignedBuffer<PairLookups> pairs_;   // one
+    AlignedBuffer<PoolSample> samples_;  // of a chunk; empty if corners are folded
   };
 
   // features: as ExpandCorners gives them. Errors: kCorruptData (tensors that do not fit the pack
@@ -41,10 +42,17 @@ class BatchEvaluator {
  private:
   BatchEvaluator() = default;
 
+  void FoldFirstLayer();
+  void LookUp(const Direction* wi, const Direction* wo, int count, PairLookups* pairs) const;
+  void ForwardUnfolded(int count, Scratch* scratch) const;
+
   const BrdfKernels* kernels_ = nullptr;
   GridShape grid_;
   std::unique_ptr<NetworkLayout> layout_;
-  AlignedBuffer<float> features_, parameters_;
+  AlignedBuffer<float> parameters_;
+  // Of the corners: what the first layer makes of them, or, where that would not stay in a cache,
+  // the features themselves.
+  AlignedBuffer<float> folded_, features_;
 };
 
 }  // namespace patina::brdf

@@ -44,6 +44,8 @@ ChunkScratch::ChunkScratch(const NetworkLayout& layout) : outputs(kChunkRows * 1
   int widest = 16;
   for (const DenseLayer& layer : layout.layers) {
     activations.emplace_back(static_cast<size_t>(kChunkRows) * layer.input_stride);
+    for (int s = 0; s < kChunkRows; ++s)
+      activations.back()[static_cast<size_t>(s) * layer.input_stride + layer.inputs] = 1;
     widest = std::max(widest, layer.outputs);
   }
   for (auto& buffer : gradient) buffer.Reset(static_cast<size_t>(kChunkRows) * widest);

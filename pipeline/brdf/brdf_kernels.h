@@ -73,6 +73,15 @@ struct LookUpGrid {
   bool isotropic = true, canonical_order = true, angle_inputs = true, half_vector_inputs = false;
 };
 
+// Lookups of a chunk of pairs to evaluate: what PoolSample holds, pairs in lanes. Pairs beyond
+// those asked for repeat one of them.
+struct PairLookups {
+  alignas(64) int32_t corner[8][kChunkRows];
+  alignas(64) float weight[8][kChunkRows];
+  alignas(64) float extra[kMaxExtraInputs][kChunkRows];
+};
+
+// Columns of ones (the biases') are set here and stay.
 struct ChunkScratch {
   explicit ChunkScratch(const NetworkLayout& layout);
   std::vector<AlignedBuffer<float>> activations;  // [layer] [kChunkRows][input_stride]
@@ -112,12 +121,17 @@ struct BrdfKernels {
   void (*train_chunk)(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* result);
   // Forward only: y [kChunkRows][16] into scratch->outputs.
   void (*forward_chunk)(const ChunkTask& task, ChunkScratch* scratch);
-  // Fills corners, weights and scalars of `count` pairs, as LookUpPair (sample_pool.h) does within
-  // a few roundings. Directions are finite.
+  // Corners, weights and scalars of 1..kChunkRows pairs, as LookUpPair (sample_pool.h) gives them
+  // within a few roundings. Directions are finite.
   void (*look_up_pairs)(const LookUpGrid& grid, const Direction* wi, const Direction* wo, int count,
-                        PoolSample* samples);
-  // rgb [count][3] = max(0, exp(min(y, 12)) - 1) of the outputs of forward_chunk; 0 where a
-  // direction is not above the horizon.
+                        PairLookups* pairs);
+  // forward_chunk without the product of the first layer: it is linear, so its weights may act on
+  // the corners' features beforehand. folded: rows of layers[0].outputs floats, W F of each corner,
+  // without the bias.
+  void (*evaluate_chunk)(const NetworkLayout& layout, const float* parameters, const float* folded,
+                         const PairLookups& pairs, ChunkScratch* scratch);
+  // rgb [count][3] = max(0, exp(min(y, 12)) - 1) of the outputs of forward_chunk, 1..kChunkRows of
+  // them; 0 where a direction is not above the horizon.
   void (*output_values)(const float* outputs, const Direction* wi, const Direction* wo, int count,
                         float* rgb);
   // gradient[corner] += weight * feature gradient, for one hemisphere (0: wi, 1: wo), in sample

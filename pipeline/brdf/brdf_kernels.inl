@@ -38,31 +38,29 @@ PATINA_STAGE void GatherRows(const ChunkTask& task, float* rows) {
     }
     float* extra = row + 2 * stride;
     for (int e = 0; e < layout.extra_inputs; ++e) extra[e] = sample.extra[e];
-    extra[layout.extra_inputs] = 1.0f;
   }
 }
 
-PATINA_STAGE void Rectify(float* c, int columns, int stride) {
-  for (int s = 0; s < kChunkRows; ++s) {
-    float* row = c + static_cast<ptrdiff_t>(s) * stride;
-    for (int n = 0; n < columns; n += 16) Store(row + n, Max(Load(row + n), Zero()));
-    row[columns] = 1.0f;
-  }
-}
-
-void ForwardRows(const ChunkTask& task, ChunkScratch* scratch) {
-  const NetworkLayout& layout = *task.layout;
-  GatherRows(task, scratch->activations[0].data());
-  for (size_t l = 0; l < layout.layers.size(); ++l) {
+// The layers from `first` on, whose activations are set.
+void ForwardLayers(const NetworkLayout& layout, const float* parameters, size_t first,
+                   ChunkScratch* scratch) {
+  for (size_t l = first; l < layout.layers.size(); ++l) {
     const DenseLayer& layer = layout.layers[l];
-    const bool last = l + 1 == layout.layers.size();
-    float* c = last ? scratch->outputs.data() : scratch->activations[l + 1].data();
-    const int c_stride = last ? 16 : layout.layers[l + 1].input_stride;
-    RowProduct({scratch->activations[l].data(), layer.input_stride, 1}, kChunkRows,
-               task.parameters + layer.weights, layer.outputs, layer.inputs + 1, layer.outputs, c,
-               c_stride);
-    if (!last) Rectify(c, layer.outputs, c_stride);
+    const Strided a = {scratch->activations[l].data(), layer.input_stride, 1};
+    const float* weights = parameters + layer.weights;
+    if (l + 1 == layout.layers.size()) {
+      RowProduct<false>(a, kChunkRows, weights, layer.outputs, layer.inputs + 1, layer.outputs,
+                        scratch->outputs.data(), 16);
+    } else {
+      RowProduct<true>(a, kChunkRows, weights, layer.outputs, layer.inputs + 1, layer.outputs,
+                       scratch->activations[l + 1].data(), layout.layers[l + 1].input_stride);
+    }
   }
+}
+
+void ForwardChunk(const ChunkTask& task, ChunkScratch* scratch) {
+  GatherRows(task, scratch->activations[0].data());
+  ForwardLayers(*task.layout, task.parameters, 0, scratch);
 }
 
 // One channel of sixteen samples: loss and its derivative by y.
@@ -137,22 +135,54 @@ PATINA_STAGE bool SquaresAreFinite(const float* values, size_t count) {
   return ReduceSum(sum) == 0.0f;
 }
 
+// The first hidden layer from corners that went through its weights before.
+PATINA_STAGE void GatherFolded(const NetworkLayout& layout, const float* parameters,
+                               const float* folded, const brdf::PairLookups& pairs, float* rows) {
+  const DenseLayer& first = layout.layers[0];
+  const ptrdiff_t columns = first.outputs, stride = layout.layers[1].input_stride;
+  const float* scalars =
+      parameters + first.weights + static_cast<ptrdiff_t>(2 * layout.feature_stride) * columns;
+  const float* bias = scalars + layout.extra_inputs * columns;
+  for (int s = 0; s < kChunkRows; ++s) {
+    for (ptrdiff_t n = 0; n < columns; n += 16) {
+      F16 near = Load(bias + n), far = Zero();
+      for (int e = 0; e < layout.extra_inputs; ++e)
+        near = MulAdd(Set(pairs.extra[e][s]), Load(scalars + e * columns + n), near);
+      Unroll<4>([&](auto c) PATINA_LAMBDA {
+        near =
+            MulAdd(Set(pairs.weight[c][s]), Load(folded + pairs.corner[c][s] * columns + n), near);
+        far = MulAdd(Set(pairs.weight[4 + c][s]),
+                     Load(folded + pairs.corner[4 + c][s] * columns + n), far);
+      });
+      Store(rows + s * stride + n, Max(near + far, Zero()));
+    }
+  }
+}
+
+void EvaluateChunk(const NetworkLayout& layout, const float* parameters, const float* folded,
+                   const brdf::PairLookups& pairs, ChunkScratch* scratch) {
+  GatherFolded(layout, parameters, folded, pairs, scratch->activations[1].data());
+  ForwardLayers(layout, parameters, 1, scratch);
+}
+
 void TrainChunk(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* result) {
   const NetworkLayout& layout = *task.layout;
-  ForwardRows(task, scratch);
+  ForwardChunk(task, scratch);
   result->loss = LossRows(task, scratch->outputs.data());
   const float* upper = scratch->outputs.data();
   for (size_t l = layout.layers.size(); l-- > 0;) {
     const DenseLayer& layer = layout.layers[l];
     const float* a = scratch->activations[l].data();
-    RowProduct({a, 1, layer.input_stride}, layer.inputs + 1, upper, layer.outputs, kChunkRows,
-               layer.outputs, result->weight_gradient.data() + layer.weights, layer.outputs);
+    RowProduct<false>({a, 1, layer.input_stride}, layer.inputs + 1, upper, layer.outputs,
+                      kChunkRows, layer.outputs, result->weight_gradient.data() + layer.weights,
+                      layer.outputs);
     // To the inputs: of the first layer only the features have a use for it.
     const int columns = l == 0 ? 2 * layout.feature_stride : brdf::PadTo16(layer.inputs);
     float* lower = l == 0 ? result->feature_gradient.data() : scratch->gradient[l % 2].data();
-    RowProduct({upper, layer.outputs, 1}, kChunkRows, task.transposed + layer.transposed,
-               brdf::PadTo16(layer.inputs),
-               l + 1 == layout.layers.size() ? kOutputs : layer.outputs, columns, lower, columns);
+    RowProduct<false>({upper, layer.outputs, 1}, kChunkRows, task.transposed + layer.transposed,
+                      brdf::PadTo16(layer.inputs),
+                      l + 1 == layout.layers.size() ? kOutputs : layer.outputs, columns, lower,
+                      columns);
     if (l > 0) MaskRows(a, layer.input_stride, lower, columns);
     upper = lower;
   }
@@ -160,8 +190,6 @@ void TrainChunk(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* resul
                    SquaresAreFinite(result->feature_gradient.data(),
                                     static_cast<size_t>(kChunkRows) * 2 * layout.feature_stride);
 }
-
-void ForwardChunk(const ChunkTask& task, ChunkScratch* scratch) { ForwardRows(task, scratch); }
 
 void Scatter(const NetworkLayout& layout, const PoolSample* samples, int count, int hemisphere,
              const ChunkResult& result, float* gradient) {
@@ -224,7 +252,7 @@ void Adam(float* parameters, float* gradient, float* moment1, float* moment2, si
 }  // namespace
 
 extern const brdf::BrdfKernels kBrdfKernels;
-const brdf::BrdfKernels kBrdfKernels = {TrainChunk, ForwardChunk,    LookUpPairs, OutputValues,
-                                        Scatter,    SoftmaxGradient, Adam};
+const brdf::BrdfKernels kBrdfKernels = {TrainChunk,   ForwardChunk, LookUpPairs,     EvaluateChunk,
+                                        OutputValues, Scatter,      SoftmaxGradient, Adam};
 
 }  // namespace patina::PATINA_SIMD

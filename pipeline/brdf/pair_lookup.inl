@@ -131,9 +131,9 @@ PATINA_INLINE void HalfVectorInputs16(const Directions16& wi, const Directions16
 }
 
 PATINA_STAGE void LookUpPairs(const brdf::LookUpGrid& grid, const brdf::Direction* wi,
-                              const brdf::Direction* wo, int count, brdf::PoolSample* samples) {
+                              const brdf::Direction* wo, int count, brdf::PairLookups* pairs) {
   alignas(64) float lanes[6][16];
-  for (int first = 0; first < count; first += 16) {
+  for (int first = 0; first < brdf::kChunkRows; first += 16) {
     for (int l = 0; l < 16; ++l) {
       const int at = first + (first + l < count ? l : 0);
       lanes[0][l] = wi[at].x, lanes[1][l] = wi[at].y, lanes[2][l] = wi[at].z;
@@ -173,44 +173,31 @@ PATINA_STAGE void LookUpPairs(const brdf::LookUpGrid& grid, const brdf::Directio
     Corners16 near, far;
     LookUpCorners(grid.nside, in, grid.isotropic, &near);
     LookUpCorners(grid.nside, out, false, &far);
-    alignas(64) int32_t index[8][16];
-    alignas(64) float weight[8][16], scalar[brdf::kMaxExtraInputs][16];
     const I16 second = SetI(grid.corners);
     Unroll<4>([&](auto c) PATINA_LAMBDA {
-      StoreI(index[c], near.index[c]);
-      StoreI(index[4 + c], far.index[c] + second);
-      Store(weight[c], near.weight[c]);
-      Store(weight[4 + c], far.weight[c]);
+      StoreI(pairs->corner[c] + first, near.index[c]);
+      StoreI(pairs->corner[4 + c] + first, far.index[c] + second);
+      Store(pairs->weight[c] + first, near.weight[c]);
+      Store(pairs->weight[4 + c] + first, far.weight[c]);
     });
-    for (int e = 0; e < extras; ++e) Store(scalar[e], extra[e]);
-    const int used = count - first < 16 ? count - first : 16;
-    for (int l = 0; l < used; ++l) {
-      brdf::PoolSample& sample = samples[first + l];
-      for (int c = 0; c < 8; ++c) sample.corner[c] = index[c][l];
-      for (int c = 0; c < 8; ++c) sample.weight[c] = weight[c][l];
-      for (int e = 0; e < extras; ++e) sample.extra[e] = scalar[e][l];
-    }
+    for (int e = 0; e < extras; ++e) Store(pairs->extra[e] + first, extra[e]);
   }
 }
 
 // rgb [count][3] of the outputs of a forward pass.
 PATINA_STAGE void OutputValues(const float* outputs, const brdf::Direction* wi,
                                const brdf::Direction* wo, int count, float* rgb) {
-  alignas(64) float lanes[16];
-  const int values = 3 * count;
-  for (int first = 0; first < values; first += 16) {
-    const int used = values - first < 16 ? values - first : 16;
-    for (int l = 0; l < 16; ++l) {
-      const int at = first + (l < used ? l : 0);
-      lanes[l] = outputs[at / 3 * 16 + at % 3];
-    }
+  // Four of the sixteen outputs of a sample, the last one padding; a vector is four samples.
+  alignas(64) float values[4 * brdf::kChunkRows] = {};
+  for (int s = 0; s < count; ++s) _mm_storeu_ps(values + 4 * s, _mm_loadu_ps(outputs + 16 * s));
+  for (int s = 0; s < count; s += 4) {
     // NaN, which only absurd weights can give, becomes 0, as in the decoder.
-    const F16 y = Min(Max(Load(lanes), Zero()), Set(brdf::kMaxLogValue));
-    Store(lanes, Exp(y) - Set(1.0f));
-    for (int l = 0; l < used; ++l) {
-      const int s = (first + l) / 3;
-      rgb[first + l] = wi[s].z > 0 && wo[s].z > 0 ? lanes[l] : 0.0f;
-    }
+    const F16 y = Min(Max(Load(values + 4 * s), Zero()), Set(brdf::kMaxLogValue));
+    Store(values + 4 * s, Exp(y) - Set(1.0f));
+  }
+  for (int s = 0; s < count; ++s) {
+    const bool above = wi[s].z > 0 && wo[s].z > 0;
+    for (int c = 0; c < 3; ++c) rgb[3 * s + c] = above ? values[4 * s + c] : 0.0f;
   }
 }
 

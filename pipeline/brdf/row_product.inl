@@ -16,8 +16,8 @@ struct Strided {
   ptrdiff_t row, step;
 };
 
-// C[m][0..16*kVectors) = sum over k of A(m, k) B[k][..] for kRows rows.
-template <int kRows, int kVectors>
+// C[m][0..16*kVectors) = sum over k of A(m, k) B[k][..] for kRows rows; kRectify: not below zero.
+template <int kRows, int kVectors, bool kRectify>
 PATINA_INLINE void ProductTile(const Strided& a, const float* b, ptrdiff_t b_stride, int depth,
                                float* c, ptrdiff_t c_stride) {
   F16 sum[kRows][kVectors];
@@ -35,33 +35,38 @@ PATINA_INLINE void ProductTile(const Strided& a, const float* b, ptrdiff_t b_str
     });
   }
   Unroll<kRows>([&](auto m) PATINA_LAMBDA {
-    Unroll<kVectors>([&](auto n) PATINA_LAMBDA { Store(c + m * c_stride + 16 * n, sum[m][n]); });
+    Unroll<kVectors>([&](auto n) PATINA_LAMBDA {
+      Store(c + m * c_stride + 16 * n, kRectify ? Max(sum[m][n], Zero()) : sum[m][n]);
+    });
   });
 }
 
-template <int kVectors>
+template <int kVectors, bool kRectify>
 PATINA_INLINE void ProductColumns(Strided a, int rows, const float* b, ptrdiff_t b_stride,
                                   int depth, float* c, ptrdiff_t c_stride) {
   for (; rows >= kTileRows; rows -= kTileRows) {
-    ProductTile<kTileRows, kVectors>(a, b, b_stride, depth, c, c_stride);
+    ProductTile<kTileRows, kVectors, kRectify>(a, b, b_stride, depth, c, c_stride);
     a.a += kTileRows * a.row;
     c += kTileRows * c_stride;
   }
   for (; rows > 0; --rows) {
-    ProductTile<1, kVectors>(a, b, b_stride, depth, c, c_stride);
+    ProductTile<1, kVectors, kRectify>(a, b, b_stride, depth, c, c_stride);
     a.a += a.row;
     c += c_stride;
   }
 }
 
-// C [rows][columns] = A B, columns a multiple of 16; B and C rows aligned to 64 bytes.
+// C [rows][columns] = A B, columns a multiple of 16; B and C rows aligned to 64 bytes. kRectify:
+// negative sums become zero.
+template <bool kRectify>
 PATINA_STAGE void RowProduct(const Strided& a, int rows, const float* b, ptrdiff_t b_stride,
                              int depth, int columns, float* c, ptrdiff_t c_stride) {
   int n = 0;
   for (; n + 16 * kTileVectors <= columns; n += 16 * kTileVectors) {
-    ProductColumns<kTileVectors>(a, rows, b + n, b_stride, depth, c + n, c_stride);
+    ProductColumns<kTileVectors, kRectify>(a, rows, b + n, b_stride, depth, c + n, c_stride);
   }
-  for (; n < columns; n += 16) ProductColumns<1>(a, rows, b + n, b_stride, depth, c + n, c_stride);
+  for (; n < columns; n += 16)
+    ProductColumns<1, kRectify>(a, rows, b + n, b_stride, depth, c + n, c_stride);
 }
 
 }  // namespace

@@ -376,12 +376,10 @@ ModelShape DefaultShape(const SourceKind& kind) {
   shape.grid.isotropic = kind.isotropic;
   if (kind.list) {
     shape.grid.nside = 4;
-    shape.hidden_layers = 3;
   } else if (!kind.isotropic) {
     shape.grid.nside = 12;
     shape.index_bits = 10;
     shape.hidden = 64;
-    shape.hidden_layers = 3;
   }
   shape.grid.half_vector_inputs = !kind.isotropic;
   return shape;
@@ -393,6 +391,7 @@ ModelShape PaperShape(const SourceKind& kind) {
   shape.grid.nside = 64;
   shape.grid.angle_inputs = shape.grid.canonical_order = false;
   shape.hidden = 64;
+  shape.hidden_layers = 2;
   return shape;
 }
 
@@ -413,6 +412,10 @@ TrainOptions DefaultTraining(const SourceKind& kind) {
     options.half_angle_share = 0.7;
     options.free_steps = options.codebook_steps = 12000;
     options.decay = 0.2f;
+  } else {
+    options.batch = 1024;
+    options.feature_rate = 0.01f;
+    options.codebook_rate = 0.005f;
   }
   return options;
 }

@@ -26,7 +26,7 @@ struct ModelShape {
   int primitive_size = 16;  // k
   int index_bits = 9;       // b
   int hidden = 32;
-  int hidden_layers = 2;
+  int hidden_layers = 3;
 };
 
 // What of a source decides the shape of its model.

@@ -9,7 +9,7 @@
 namespace patina {
 
 // Raised whenever the same BRDF file, job and seed would give other bytes. Part of the fingerprint.
-inline constexpr int kBrdfRecipeVersion = 2;
+inline constexpr int kBrdfRecipeVersion = 3;
 
 // Limits of Job::model; the least is 1 where none is named.
 inline constexpr int kMaxJobNside = 256;

@@ -94,15 +94,16 @@ struct Row {
 };
 
 constexpr Row kRows[] = {
-    {"default: Nside 16, 32 x 2, bilinear", 16, 32, 2, true, healpix::Interpolation::kBilinear},
-    {"inverse distance", 16, 32, 2, true, healpix::Interpolation::kInverseDistance},
-    {"uniform", 16, 32, 2, true, healpix::Interpolation::kUniform},
+    {"default: Nside 16, 32 x 3, bilinear", 16, 32, 3, true, healpix::Interpolation::kBilinear},
+    {"inverse distance", 16, 32, 3, true, healpix::Interpolation::kInverseDistance},
+    {"uniform", 16, 32, 3, true, healpix::Interpolation::kUniform},
     {"16 x 2", 16, 16, 2, true, healpix::Interpolation::kBilinear},
+    {"32 x 2", 16, 32, 2, true, healpix::Interpolation::kBilinear},
     {"64 x 2", 16, 64, 2, true, healpix::Interpolation::kBilinear},
     {"64 x 3", 16, 64, 3, true, healpix::Interpolation::kBilinear},
-    {"Nside 32", 32, 32, 2, true, healpix::Interpolation::kBilinear},
-    {"Nside 64", 64, 32, 2, true, healpix::Interpolation::kBilinear},
-    {"no scalar inputs", 16, 32, 2, false, healpix::Interpolation::kBilinear},
+    {"Nside 32", 32, 32, 3, true, healpix::Interpolation::kBilinear},
+    {"Nside 64", 64, 32, 3, true, healpix::Interpolation::kBilinear},
+    {"no scalar inputs", 16, 32, 3, false, healpix::Interpolation::kBilinear},
     {"the paper's: Nside 64, 64 x 2, plain", 64, 64, 2, false, healpix::Interpolation::kBilinear},
 };
 
@@ -113,14 +114,16 @@ Source GlossySource() {
 }
 
 int TrainingTable(double seconds) {
+  const int batch = DefaultTraining({}).batch;
   std::printf(
-      "Training, batches of 512 samples\n\n| model | target | threads | M sample/s | GFLOP/s | "
-      "peak | share |\n|---|---|---|---|---|---|---|\n");
+      "Training, batches of %d samples\n\n| model | target | threads | M sample/s | GFLOP/s | "
+      "peak | share |\n|---|---|---|---|---|---|---|\n",
+      batch);
   const Source source = GlossySource();
   for (const SimdTarget target : {SimdTarget::kAvx2, SimdTarget::kAvx512}) {
     if (!SimdTargetSupported(target)) continue;
     for (const int threads : {1, 2}) {
-      for (const Row& row : {kRows[0], kRows[4], kRows[5]}) {
+      for (const Row& row : {kRows[0], kRows[4], kRows[6]}) {
         ThreadPool pool(threads);
         GridShape grid;
         grid.nside = row.nside;
@@ -129,16 +132,15 @@ int TrainingTable(double seconds) {
         const AlignedBuffer<PoolSample> samples = DrawPool(source, grid, options, pool);
         const NetworkLayout layout(16, 3, row.hidden, row.hidden_layers);
         GridTrainer trainer(layout, 2 * grid.corners(), KernelsFor(target), pool, 1);
-        constexpr int kBatch = 512;
         size_t next = 0;
         std::vector<double> rates, peaks, shares;
         for (int round = 0; round < kRounds; ++round) {
           peaks.push_back(PeakGflops(target, pool, seconds / 2));
           const double steps = Rate(seconds, [&] {
-            trainer.Step(samples.data() + next, kBatch, {1e-4f, 1e-4f});
-            next = (next + kBatch) % (samples.size() - kBatch);
+            trainer.Step(samples.data() + next, batch, {1e-4f, 1e-4f});
+            next = (next + batch) % (samples.size() - batch);
           });
-          rates.push_back(steps * kBatch);
+          rates.push_back(steps * batch);
           shares.push_back(rates.back() * 6 * layout.ForwardMacs() * 1e-9 / peaks.back());
         }
         const double rate = Median(rates);

@@ -30,8 +30,6 @@ bool Draw(const brdf::Source& source, const brdf::PoolOptions& options, uint64_t
       valid = source.table->Evaluate(pair->wi, pair->wo, pair->value);
     }
   }
-  // The peers' outputs have the same cap as ours.
-  for (float& value : pair->value) value = std::min(value, brdf::kMaxValue);
   pair->cosine = std::max(pair->wi.z, pair->wo.z);
   return valid;
 }

@@ -119,8 +119,10 @@ AlignedBuffer<NbrdfTile> MakeNbrdfTiles(const TrainingPair* pairs, size_t count,
     put(4, y);
     put(5, std::sin(theta_h) * x + std::cos(theta_h) * z);
     for (int c = 0; c < 3; ++c) {
-      tile.wanted_g[c][l] = Log1p(pair.value[c] * pair.cosine);
-      tile.wanted_y[c][l] = Log1p(pair.value[c]);
+      // Its outputs have the same cap as ours, and the same must not be asked of them.
+      const float value = std::min(pair.value[c], brdf::kMaxValue);
+      tile.wanted_g[c][l] = Log1p(value * pair.cosine);
+      tile.wanted_y[c][l] = Log1p(value);
     }
     tile.cosine[l] = pair.cosine;
     tile.importance[l] = pair.importance;

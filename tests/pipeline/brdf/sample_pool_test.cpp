@@ -135,8 +135,18 @@ TEST(SamplePool, TheKernelsLookUpPairsAsTheScalarCodeDoes) {
           }
         }
         std::vector<PoolSample> samples(wi.size());
-        KernelsFor(target).look_up_pairs(grid, wi.data(), wo.data(), static_cast<int>(wi.size()),
-                                         samples.data());
+        PairLookups pairs;
+        for (size_t first = 0; first < wi.size(); first += kChunkRows) {
+          const size_t used = std::min<size_t>(kChunkRows, wi.size() - first);
+          KernelsFor(target).look_up_pairs(grid, &wi[first], &wo[first], static_cast<int>(used),
+                                           &pairs);
+          for (size_t s = 0; s < used; ++s) {
+            PoolSample& sample = samples[first + s];
+            for (int c = 0; c < 8; ++c) sample.corner[c] = pairs.corner[c][s];
+            for (int c = 0; c < 8; ++c) sample.weight[c] = pairs.weight[c][s];
+            for (int e = 0; e < shape.extra_inputs(); ++e) sample.extra[e] = pairs.extra[e][s];
+          }
+        }
         for (size_t s = 0; s < wi.size(); ++s) {
           PoolSample wanted = {};
           LookUpPair(shape, wi[s], wo[s], &wanted);
