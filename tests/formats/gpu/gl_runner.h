@@ -1,0 +1,48 @@
+// Runs GpuPrograms with OpenGL.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/formats/gpu/gl_context.h"
+#include "tests/formats/gpu/gpu_program.h"
+
+namespace patina::gpu_test {
+
+// A linked program with its textures and constants bound.
+class GlProgram {
+ public:
+  // Vertex and fragment shader, without version lines; fragment may be empty. `captured`: the
+  // output of the vertex shader to be kept by transform feedback, or empty. Fails the current test,
+  // with the driver's message, if it does not compile.
+  GlProgram(const GlContext& gl, const GpuProgram& program, const std::string& vertex,
+            const std::string& fragment, const std::string& captured);
+  ~GlProgram();
+  GlProgram(const GlProgram&) = delete;
+  GlProgram& operator=(const GlProgram&) = delete;
+  bool good() const { return good_; }
+  // Makes the program current and binds its textures and constants.
+  void Use() const;
+
+ private:
+  void Upload(const GpuTexture& texture, bool wrap);
+  const GlContext& gl_;
+  GLuint program_ = 0;
+  std::vector<std::pair<int, GLuint>> textures_;  // unit, texture
+  GLuint constants_ = 0;
+  int constants_binding_ = 0;
+  bool good_ = false;
+};
+
+// For each item, eight floats of `inputs` (in0, in1), program.outputs floats: in the vertex stage,
+// where each item has a level of detail of its own (llvmpipe shares it within a quad of fragments).
+std::vector<float> RunOnGl(const GlContext& gl, const GpuProgram& program,
+                           std::span<const float> inputs);
+
+// The program's body on a picture of width x height pixels, with the statement `prologue` before
+// it; four floats a pixel, from the bottom row: result[0] to result[3].
+std::vector<float> RenderOnGl(const GlContext& gl, const GpuProgram& program, int width,
+                              int height);
+
+}  // namespace patina::gpu_test

@@ -1,0 +1,198 @@
+// The GLSL decoder of materials on llvmpipe, with the files as they are, against the C++ decoder.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/formats/gpu/gl_runner.h"
+#include "tests/formats/gpu/material_samples.h"
+#include "tests/formats/test_support.h"
+
+namespace patina::gpu_test {
+namespace {
+
+using test::TemporaryDirectory;
+
+// What is promised is 1e-3 of a channel's range: GPUs may round filter weights to 8 bits. llvmpipe
+// filters in floats, so the bound here is what differs besides: float positions (2^-23 of up to 4
+// texture widths of 128 texels are 6e-5 texels, times differences of neighbours of about a range),
+// another order of sums, and pow.
+constexpr double kBound = 1e-4;
+
+Decoder LoadDecoder(const Container& container) {
+  Decoder decoder;
+  std::string problem;
+  EXPECT_EQ(Decoder::Load(container.directory, &decoder, &problem), Decoder::LoadStatus::kOk)
+      << problem;
+  return decoder;
+}
+
+// The largest difference as a share of the channel's range; every value is looked at.
+void ExpectClose(const Decoder& decoder, const std::vector<float>& lookups,
+                 const std::vector<float>& from_gpu, const std::vector<float>& expected) {
+  ASSERT_EQ(from_gpu.size(), expected.size());
+  const size_t channels = decoder.channels().size();
+  double worst = 0;
+  size_t at = 0;
+  for (size_t i = 0; i < expected.size(); ++i) {
+    const double error = std::abs(static_cast<double>(from_gpu[i]) - expected[i]) /
+                         PhysicalRange(decoder.channels()[i % channels]);
+    if (!(error <= worst)) worst = error, at = i;  // NaN counts
+  }
+  const float* place = lookups.data() + at / channels * 8;
+  EXPECT_LE(worst, kBound) << "channel " << at % channels << " at " << place[0] << ", " << place[1]
+                           << ", " << place[2] << ": " << from_gpu[at] << " instead of "
+                           << expected[at];
+}
+
+class MaterialOnGl : public testing::TestWithParam<GlApi> {
+ protected:
+  void SetUp() override {
+    std::string why;
+    gl_ = GlContext::Create(GetParam(), GlCompiler::kQuick, &why);
+    PATINA_NEED_MESA(gl_ != nullptr, "libgl1-mesa-dri", why);
+    ASSERT_NE(gl_->renderer().find("llvmpipe"), std::string::npos) << gl_->renderer();
+  }
+
+  void Check(const MaterialShape& shape, uint64_t seed, size_t count = 3000) {
+    const TemporaryDirectory folder;
+    const Container container = MakeMaterial(folder.path(), shape, seed);
+    const Decoder decoder = LoadDecoder(container);
+    ShaderOptions options;
+    options.language = GetParam() == GlApi::kEs30 ? ShaderLanguage::kEssl : ShaderLanguage::kGlsl;
+    GpuProgram program = LoadProgram(container, options);
+    SetMaterialBody(&program, static_cast<int>(decoder.channels().size()));
+    const auto lookups = RandomLookups(seed, count, shape.width, shape.height);
+    ExpectClose(decoder, lookups, RunOnGl(*gl_, program, lookups), Decoded(decoder, lookups));
+  }
+
+  std::unique_ptr<GlContext> gl_;
+};
+
+TEST_P(MaterialOnGl, AgreesAtRandomPlaces) {
+  Check({}, 1);
+  Check({.address = "clamp"}, 2);
+}
+
+TEST_P(MaterialOnGl, AgreesWithOddAndNarrowSizes) {
+  Check({.width = 37, .height = 101, .shifts = {0, 1, 2, 3}}, 3);
+  Check({.width = 37, .height = 101, .shifts = {0, 1, 2, 3}, .address = "clamp"}, 4);
+  Check({.width = 128, .height = 3, .shifts = {1, 1, 3, 3}}, 5);
+  Check({.width = 1, .height = 1, .shifts = {0, 1, 2, 3}}, 6);
+}
+
+TEST_P(MaterialOnGl, AgreesForAnyNumberOfChannels) {
+  const bool es = GetParam() == GlApi::kEs30;
+  for (const int outputs : es ? std::vector<int>{1, 21} : std::vector<int>{1, 2, 3, 4, 16, 21})
+    Check({.outputs = outputs}, static_cast<uint64_t>(10 + outputs), 500);
+}
+
+TEST_P(MaterialOnGl, AgreesWithConstants) {
+  Check({.outputs = 4, .constants = 3}, 40, 500);
+  Check({.outputs = 1, .constants = 6}, 41, 500);
+  Check({.shifts = {}, .outputs = 0, .constants = 7}, 42, 100);
+}
+
+TEST_P(MaterialOnGl, AgreesForAnyNumberOfTextures) {
+  Check({.shifts = {0}}, 50, 500);
+  Check({.shifts = {2, 0}}, 51, 500);
+  Check({.shifts = {0, 1, 2}}, 52, 500);
+  Check({.shifts = {0, 1, 2, 3, 4}}, 53, 500);
+  Check({.shifts = {0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 0}}, 54, 500);
+}
+
+TEST_P(MaterialOnGl, AgreesForSignedTextures) { Check({.is_signed = true}, 60); }
+
+TEST_P(MaterialOnGl, AgreesForAnyWidth) {
+  Check({.hidden = 1}, 70, 500);
+  Check({.hidden = 30}, 71, 500);
+}
+
+// More weights than a constant buffer is sure to hold in ES.
+TEST_P(MaterialOnGl, AgreesWithWeightsInATexture) {
+  Check({.shifts = {1}, .hidden = 120, .outputs = 30}, 72, 200);
+}
+
+TEST_P(MaterialOnGl, GivesWhatUnpackWrites) {
+  const MaterialShape shape{.width = 40, .height = 24};
+  const TemporaryDirectory folder;
+  const Container container = MakeMaterial(folder.path(), shape, 80);
+  const Decoder decoder = LoadDecoder(container);
+  const size_t channels = decoder.channels().size();
+  std::vector<float> lookups, expected;
+  for (int mip = 0; mip < decoder.levels(); ++mip) {
+    const int width = decoder.MipWidth(mip), height = decoder.MipHeight(mip);
+    const size_t plane = static_cast<size_t>(width) * height;
+    const std::vector<float> coded = decoder.DecodeMip(mip);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        lookups.insert(lookups.end(), {static_cast<float>((x + 0.5) / width),
+                                       static_cast<float>((y + 0.5) / height),
+                                       static_cast<float>(mip), 0, 0, 0, 0, 0});
+        for (size_t c = 0; c < channels; ++c) {
+          const size_t at = c * plane + static_cast<size_t>(y) * width + x;
+          expected.push_back(Decoder::ToPhysical(decoder.channels()[c], coded[at]));
+        }
+      }
+    }
+  }
+  ShaderOptions options;
+  options.language = GetParam() == GlApi::kEs30 ? ShaderLanguage::kEssl : ShaderLanguage::kGlsl;
+  options.first_binding = 3;
+  GpuProgram program = LoadProgram(container, options);
+  SetMaterialBody(&program, static_cast<int>(channels));
+  ExpectClose(decoder, lookups, RunOnGl(*gl_, program, lookups), expected);
+}
+
+// The derivatives of (u, v) choose the level: Eq. 11 of the paper on a picture of bands with other
+// scales, also below the finest and above the coarsest level.
+TEST_P(MaterialOnGl, ImplicitEntryFollowsTheScreen) {
+  const MaterialShape shape{.width = 64, .height = 32};
+  const TemporaryDirectory folder;
+  const Container container = MakeMaterial(folder.path(), shape, 90);
+  const Decoder decoder = LoadDecoder(container);
+  const size_t channels = decoder.channels().size();
+  ShaderOptions options;
+  options.language = GetParam() == GlApi::kEs30 ? ShaderLanguage::kEssl : ShaderLanguage::kGlsl;
+  // Texels of the source per pixel, along x and along y; the larger one counts.
+  const std::vector<std::array<double, 2>> steps = {{0.125, 0.03125}, {1, 1},  {3, 0.5},
+                                                    {0.75, 5.5},      {40, 2}, {1000, 900}};
+  const int width = 16, band = 8, height = band * static_cast<int>(steps.size());
+  GpuProgram program = LoadProgram(container, options);
+  program.shader = "#define PATINA_DERIVATIVES\n" + program.shader;
+  program.outputs = static_cast<int>(channels);
+  program.body = "vec2 texels = vec2(0.0);\n";
+  for (size_t b = 0; b < steps.size(); ++b) {
+    program.body += "if (int(gl_FragCoord.y) / " + std::to_string(band) +
+                    " == " + std::to_string(b) + ") texels = vec2(" + std::to_string(steps[b][0]) +
+                    ", " + std::to_string(steps[b][1]) + ");\n";
+  }
+  program.body +=
+      "PatinaMaterial material = patina_material(gl_FragCoord.xy * texels / vec2(64.0, 32.0));\n"
+      "for (int c = 0; c < 4; ++c) result[c] = material.value[c];\n";
+  const std::vector<float> pixels = RenderOnGl(*gl_, program, width, height);
+  ASSERT_EQ(pixels.size(), static_cast<size_t>(width * height * 4));
+  std::vector<float> expected(channels);
+  for (int y = 0; y < height; ++y) {
+    const auto& [along_x, along_y] = steps[static_cast<size_t>(y / band)];
+    double worst = 0;
+    for (int x = 0; x < width; ++x) {
+      decoder.Physical((x + 0.5) * along_x / shape.width, (y + 0.5) * along_y / shape.height,
+                       std::log2(std::max(along_x, along_y)), expected.data());
+      for (size_t c = 0; c < 4; ++c) {
+        const float got = pixels[static_cast<size_t>(y * width + x) * 4 + c];
+        const double error = std::abs(static_cast<double>(expected[c]) - got);
+        worst = std::max(worst, error / PhysicalRange(decoder.channels()[c]));
+      }
+    }
+    // Differences of floats around 1000 texture widths, and log2, are off by about 1e-4 levels.
+    EXPECT_LE(worst, 1e-3) << "row " << y << ": " << along_x << " x " << along_y;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Apis, MaterialOnGl, testing::Values(GlApi::kGl45, GlApi::kEs30),
+                         [](const auto& api) {
+                           return api.param == GlApi::kGl45 ? "Gl45" : "Es30";
+                         });
+
+}  // namespace
+}  // namespace patina::gpu_test
