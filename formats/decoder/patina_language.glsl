@@ -16,6 +16,7 @@ precision highp usampler2D;
 #define PATINA_VEC4 vec4
 #define PATINA_MAT4 mat4
 #define PATINA_UNROLL
+#define PATINA_LOOP
 #define PATINA_MUL(matrix, vector) ((matrix) * (vector))
 #define PATINA_COLUMNS(a, b, c, d) mat4(a, b, c, d)
 #define PATINA_DDX(value) dFdx(value)

@@ -7,6 +7,7 @@
 #define PATINA_VEC4 float4
 #define PATINA_MAT4 column_major float4x4
 #define PATINA_UNROLL [unroll]
+#define PATINA_LOOP [loop]
 #define PATINA_MUL(matrix_, vector_) mul(matrix_, vector_)
 #define PATINA_COLUMNS(a, b, c, d) transpose(float4x4(a, b, c, d))
 #define PATINA_DDX(value) ddx(value)

@@ -30,7 +30,7 @@ class BrdfOnGl45 : public BrdfOnGl {};
 TEST_P(BrdfOnGl, AgreesForEveryRecipe) {
   // Bits: isotropic, canonical order, angle inputs.
   const bool es = GetParam() == GlApi::kEs30;
-  for (const int bits : es ? std::vector<int>{0, 7} : std::vector<int>{0, 1, 2, 4, 6, 7}) {
+  for (const int bits : es ? std::vector<int>{7} : std::vector<int>{0, 3, 4, 7}) {
     test::BrdfSampleOptions options;
     options.pack.isotropic = (bits & 1) != 0;
     options.pack.canonical_order = (bits & 2) != 0;
@@ -49,11 +49,12 @@ TEST_P(BrdfOnGl45, AgreesForEveryInterpolation) {
 }
 
 TEST_P(BrdfOnGl45, AgreesForAnyNsideAndPrimitive) {
-  const int shapes[][2] = {{1, 1}, {2, 4}, {7, 9}, {64, 3}};
+  const int shapes[][2] = {{1, 1}, {7, 9}, {64, 3}};
   for (const auto& [nside, primitive] : shapes) {
     test::BrdfSampleOptions options;
     options.pack.nside = nside;
     options.pack.primitive_size = primitive;
+    options.shared_codebook = nside == 7;
     Check(options, static_cast<uint64_t>(120 + nside), 1500);
   }
 }
@@ -61,20 +62,13 @@ TEST_P(BrdfOnGl45, AgreesForAnyNsideAndPrimitive) {
 TEST_P(BrdfOnGl, AgreesForAnyNetwork) {
   // In ES the last one is too large for a constant buffer.
   const std::vector<std::vector<int>> networks =
-      GetParam() == GlApi::kEs30
-          ? std::vector<std::vector<int>>{{60, 40}}
-          : std::vector<std::vector<int>>{{}, {5}, {32, 32}, {8, 3, 8, 1, 8}};
+      GetParam() == GlApi::kEs30 ? std::vector<std::vector<int>>{{60, 40}}
+                                 : std::vector<std::vector<int>>{{}, {8, 3, 8, 1, 8}};
   for (size_t i = 0; i < networks.size(); ++i) {
     test::BrdfSampleOptions options;
     options.hidden = networks[i];
     Check(options, 140 + i, 1000);
   }
-}
-
-TEST_P(BrdfOnGl45, AgreesWithACodebookOfItsOwnFile) {
-  test::BrdfSampleOptions options;
-  options.shared_codebook = true;
-  Check(options, 150, 500);
 }
 
 INSTANTIATE_TEST_SUITE_P(Apis, BrdfOnGl, testing::Values(GlApi::kGl45, GlApi::kEs30),

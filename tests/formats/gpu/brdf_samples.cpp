@@ -76,9 +76,8 @@ std::vector<float> RandomPairs(uint64_t seed, size_t count) {
   return pairs;
 }
 
-void CheckBrdf(
-    const test::BrdfSampleOptions& options, uint64_t seed, size_t count, ShaderLanguage language,
-    const std::function<std::vector<float>(const GpuProgram&, const std::vector<float>&)>& run) {
+void CheckBrdf(const test::BrdfSampleOptions& options, uint64_t seed, size_t count,
+               ShaderLanguage language, const RunProgram& run) {
   const test::TemporaryDirectory folder;
   auto staging = test::StageBrdfSample(folder.path(), "asset", seed, options);
   ASSERT_OK(staging);

@@ -1,7 +1,6 @@
 // BRDFs for the tests on GPUs.
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "tests/formats/gpu/gpu_program.h"
@@ -16,8 +15,7 @@ std::vector<float> RandomPairs(uint64_t seed, size_t count);
 
 // Makes a random BRDF, runs its shader at random pairs, and compares with the C++ decoder. Fails
 // the current test where they differ.
-void CheckBrdf(
-    const test::BrdfSampleOptions& options, uint64_t seed, size_t count, ShaderLanguage language,
-    const std::function<std::vector<float>(const GpuProgram&, const std::vector<float>&)>& run);
+void CheckBrdf(const test::BrdfSampleOptions& options, uint64_t seed, size_t count,
+               ShaderLanguage language, const RunProgram& run);
 
 }  // namespace patina::gpu_test

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -43,6 +44,9 @@ struct GpuProgram {
 // of the package and the container's directory. Fails the current test for what is not as it should
 // be.
 GpuProgram LoadProgram(const Container& container, const ShaderOptions& options);
+
+// Runs a program for items of eight floats (in0, in1): program.outputs floats each.
+using RunProgram = std::function<std::vector<float>(const GpuProgram&, const std::vector<float>&)>;
 
 // The body for materials: in0 = (u, v, s, -), all channels; and for BRDFs: in0 = wi, in1 = wo.
 void SetMaterialBody(GpuProgram* program, int channels);

@@ -10,6 +10,12 @@
 namespace patina::gpu_test {
 namespace {
 
+// What is promised is 1e-3 of a channel's range: GPUs may round filter weights to 8 bits. llvmpipe
+// filters in floats, so the bound here is what differs besides: float positions (2^-23 of up to 4
+// texture widths of 128 texels are 6e-5 texels, times differences of neighbours of about a range),
+// another order of sums, and pow.
+constexpr double kBound = 1e-4;
+
 using test::Random;
 
 NetworkWeights NetworkOf(Random& random, int inputs, int hidden, int outputs) {
@@ -167,6 +173,40 @@ std::vector<float> Decoded(const Decoder& decoder, const std::vector<float>& loo
     decoder.Physical(at[0], at[1], at[2], values.data() + i * channels);
   }
   return values;
+}
+
+Decoder LoadDecoder(const Container& container) {
+  Decoder decoder;
+  std::string problem;
+  EXPECT_EQ(Decoder::Load(container.directory, &decoder, &problem), Decoder::LoadStatus::kOk)
+      << problem;
+  return decoder;
+}
+
+void ExpectMaterialClose(const Decoder& decoder, const std::vector<float>& lookups,
+                         const std::vector<float>& from_gpu, const std::vector<float>& expected) {
+  ASSERT_EQ(from_gpu.size(), expected.size());
+  const size_t channels = decoder.channels().size();
+  double worst = 0;
+  size_t at = 0;
+  for (size_t i = 0; i < expected.size(); ++i) {
+    const double error = std::abs(static_cast<double>(from_gpu[i]) - expected[i]) /
+                         PhysicalRange(decoder.channels()[i % channels]);
+    if (!(error <= worst)) worst = error, at = i;  // NaN counts
+  }
+  const float* place = lookups.data() + at / channels * 8;
+  EXPECT_LE(worst, kBound) << "channel " << at % channels << " at " << place[0] << ", " << place[1]
+                           << ", " << place[2] << ": " << from_gpu[at] << " instead of "
+                           << expected[at];
+}
+
+void CheckMaterial(const Container& container, uint64_t seed, size_t count,
+                   const ShaderOptions& options, const RunProgram& run) {
+  const Decoder decoder = LoadDecoder(container);
+  GpuProgram program = LoadProgram(container, options);
+  SetMaterialBody(&program, static_cast<int>(decoder.channels().size()));
+  const auto lookups = RandomLookups(seed, count, decoder.width(), decoder.height());
+  ExpectMaterialClose(decoder, lookups, run(program, lookups), Decoded(decoder, lookups));
 }
 
 double PhysicalRange(const Decoder::Channel& channel) {

@@ -1,11 +1,13 @@
 // Materials with random content and of every shape, for the tests on GPUs.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "formats/container.h"
 #include "formats/decoder/patina_decoder.h"
+#include "tests/formats/gpu/gpu_program.h"
 
 namespace patina::gpu_test {
 
@@ -30,6 +32,17 @@ std::vector<float> RandomLookups(uint64_t seed, size_t count, int width, int hei
 
 // Physical values of all channels at each lookup by the C++ decoder.
 std::vector<float> Decoded(const Decoder& decoder, const std::vector<float>& lookups);
+
+// The C++ decoder; fails the current test if there is none.
+Decoder LoadDecoder(const Container& container);
+
+// Compares values of all channels at each lookup; the bound is a share of each channel's range.
+void ExpectMaterialClose(const Decoder& decoder, const std::vector<float>& lookups,
+                         const std::vector<float>& from_gpu, const std::vector<float>& expected);
+
+// Runs the material's shader at random lookups and compares with the C++ decoder.
+void CheckMaterial(const Container& container, uint64_t seed, size_t count,
+                   const ShaderOptions& options, const RunProgram& run);
 
 // The width of a channel's range in physical values.
 double PhysicalRange(const Decoder::Channel& channel);
