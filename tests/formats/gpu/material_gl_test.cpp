@@ -113,6 +113,32 @@ TEST_P(MaterialOnGl, GivesWhatUnpackWrites) {
   ExpectMaterialClose(decoder, lookups, RunOnGl(*gl_, program, lookups), expected);
 }
 
+// The encoding of high dynamic range: scale * sign(c) * (exp2(|c|) - 1), also for small values,
+// where the difference from 1 has no digits left.
+TEST_P(MaterialOnGl, SignedLogIsExact) {
+  const TemporaryDirectory folder;
+  const Container container =
+      MakeMaterial(folder.path(), {.shifts = {}, .outputs = 0, .constants = 1}, 95);
+  GpuProgram program = LoadProgram(container, Options());
+  program.outputs = 1;
+  program.body = "result[0] = PATINA_SIGNED_LOG(in0.x, in0.y);\n";
+  std::vector<float> inputs;
+  for (const float scale : {1.0f, 0.01f, 300.0f}) {
+    for (const float coded : {0.0f, 1e-6f, 1e-3f, 0.0288f, 0.0289f, 0.5f, 1.0f, 7.25f, 15.9f}) {
+      for (const float sign : {1.0f, -1.0f})
+        inputs.insert(inputs.end(), {sign * coded, scale, 0, 0, 0, 0, 0, 0});
+    }
+  }
+  const std::vector<float> values = RunOnGl(*gl_, program, inputs);
+  ASSERT_EQ(values.size(), inputs.size() / 8);
+  for (size_t i = 0; i < values.size(); ++i) {
+    const double coded = inputs[8 * i], scale = inputs[8 * i + 1];
+    const double expected = std::copysign(scale * (std::exp2(std::abs(coded)) - 1), coded);
+    // Next to the series exp2(x) - 1 has lost six of 24 bits.
+    EXPECT_NEAR(values[i], expected, 1e-5 * std::abs(expected)) << coded << " * " << scale;
+  }
+}
+
 // The derivatives of (u, v) choose the level: Eq. 11 of the paper on a picture of bands with other
 // scales, also below the finest and above the coarsest level.
 TEST_P(MaterialOnGl, ImplicitEntryFollowsTheScreen) {
