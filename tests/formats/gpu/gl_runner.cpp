@@ -2,12 +2,36 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <algorithm>
 
 namespace patina::gpu_test {
 namespace {
 
-constexpr GLenum kBptcUnsigned = 0x8E8F, kBptcSigned = 0x8E8E;
+// How OpenGL names a DXGI format; blocks have no format and type of pixels.
+struct PixelFormat {
+  uint32_t dxgi;
+  GLenum internal;
+  GLenum format;
+  GLenum type;
+};
+
+const PixelFormat& FormatOf(uint32_t dxgi) {
+  static constexpr PixelFormat kFormats[] = {
+      {95, GL_COMPRESSED_RGB_BPTC_UNSIGNED_FLOAT, 0, 0},
+      {96, GL_COMPRESSED_RGB_BPTC_SIGNED_FLOAT, 0, 0},
+      {71, 0x83F0 /* GL_COMPRESSED_RGB_S3TC_DXT1_EXT */, 0, 0},
+      {83, GL_COMPRESSED_RG_RGTC2, 0, 0},
+      {2, GL_RGBA32F, GL_RGBA, GL_FLOAT},
+      {10, GL_RGBA16F, GL_RGBA, GL_HALF_FLOAT},
+      {28, GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE},
+      {42, GL_R32UI, GL_RED_INTEGER, GL_UNSIGNED_INT},
+      {57, GL_R16UI, GL_RED_INTEGER, GL_UNSIGNED_SHORT}};
+  for (const PixelFormat& format : kFormats) {
+    if (format.dxgi == dxgi) return format;
+  }
+  ADD_FAILURE() << "DXGI format " << dxgi;
+  return kFormats[0];
+}
 
 GLuint Compile(const GlContext& gl, GLenum stage, const std::string& text) {
   const GLuint shader = gl.CreateShader(stage);
@@ -89,31 +113,25 @@ void GlProgram::Upload(const GpuTexture& texture, bool wrap) {
   gl_.BindTexture(GL_TEXTURE_2D, name);
   gl_.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
   const DdsFile& file = texture.file;
-  const bool features = file.dxgi_format == 95 || file.dxgi_format == 96;
+  const PixelFormat& format = FormatOf(file.dxgi_format);
   for (size_t level = 0; level < file.levels.size(); ++level) {
     const auto l = static_cast<GLint>(level);
     const GLsizei w = std::max(1, file.width >> level), h = std::max(1, file.height >> level);
-    const void* bytes = file.levels[level].data();
-    if (features) {
-      gl_.CompressedTexImage2D(GL_TEXTURE_2D, l,
-                               file.dxgi_format == 95 ? kBptcUnsigned : kBptcSigned, w, h, 0,
-                               static_cast<GLsizei>(file.levels[level].size()), bytes);
-    } else if (file.dxgi_format == 2) {
-      gl_.TexImage2D(GL_TEXTURE_2D, l, GL_RGBA32F, w, h, 0, GL_RGBA, GL_FLOAT, bytes);
-    } else if (file.dxgi_format == 10) {
-      gl_.TexImage2D(GL_TEXTURE_2D, l, GL_RGBA16F, w, h, 0, GL_RGBA, GL_HALF_FLOAT, bytes);
-    } else if (file.dxgi_format == 42) {
-      gl_.TexImage2D(GL_TEXTURE_2D, l, GL_R32UI, w, h, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, bytes);
+    const auto& bytes = file.levels[level];
+    if (format.format == 0) {
+      gl_.CompressedTexImage2D(GL_TEXTURE_2D, l, format.internal, w, h, 0,
+                               static_cast<GLsizei>(bytes.size()), bytes.data());
     } else {
-      gl_.TexImage2D(GL_TEXTURE_2D, l, GL_R16UI, w, h, 0, GL_RED_INTEGER, GL_UNSIGNED_SHORT, bytes);
+      gl_.TexImage2D(GL_TEXTURE_2D, l, static_cast<GLint>(format.internal), w, h, 0, format.format,
+                     format.type, bytes.data());
     }
   }
   const auto set = [&](GLenum parameter, GLint value) {
     gl_.TexParameteri(GL_TEXTURE_2D, parameter, value);
   };
   set(GL_TEXTURE_MAX_LEVEL, static_cast<GLint>(file.levels.size()) - 1);
-  set(GL_TEXTURE_MIN_FILTER, features ? GL_LINEAR_MIPMAP_LINEAR : GL_NEAREST);
-  set(GL_TEXTURE_MAG_FILTER, features ? GL_LINEAR : GL_NEAREST);
+  set(GL_TEXTURE_MIN_FILTER, texture.filtered ? GL_LINEAR_MIPMAP_LINEAR : GL_NEAREST);
+  set(GL_TEXTURE_MAG_FILTER, texture.filtered ? GL_LINEAR : GL_NEAREST);
   set(GL_TEXTURE_WRAP_S, wrap ? GL_REPEAT : GL_CLAMP_TO_EDGE);
   set(GL_TEXTURE_WRAP_T, wrap ? GL_REPEAT : GL_CLAMP_TO_EDGE);
 }
@@ -178,8 +196,30 @@ std::vector<float> RunOnGl(const GlContext& gl, const GpuProgram& program,
   return results;
 }
 
-std::vector<float> RenderOnGl(const GlContext& gl, const GpuProgram& program, int width,
-                              int height) {
+GlPicture::GlPicture(const GlContext& gl, int width, int height)
+    : gl_(gl), width_(width), height_(height) {
+  gl.GenTextures(1, &texture_);
+  gl.ActiveTexture(GL_TEXTURE0 + 31);
+  gl.BindTexture(GL_TEXTURE_2D, texture_);
+  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, width, height, 0, GL_RGBA, GL_FLOAT, nullptr);
+  gl.GenFramebuffers(1, &framebuffer_);
+  gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
+  gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture_, 0);
+  EXPECT_EQ(gl.CheckFramebufferStatus(GL_FRAMEBUFFER),
+            static_cast<GLenum>(GL_FRAMEBUFFER_COMPLETE));
+  gl.GenVertexArrays(1, &array_);
+  gl.BindVertexArray(array_);
+  gl.Viewport(0, 0, width, height);
+}
+
+GlPicture::~GlPicture() {
+  gl_.BindFramebuffer(GL_FRAMEBUFFER, gl_.base_framebuffer());
+  gl_.DeleteFramebuffers(1, &framebuffer_);
+  gl_.DeleteTextures(1, &texture_);
+  gl_.DeleteVertexArrays(1, &array_);
+}
+
+std::unique_ptr<GlProgram> GlPicture::Compile(const GpuProgram& program) const {
   // One triangle over the whole picture, made of the vertex number alone.
   const std::string vertex =
       "void main() {\n"
@@ -190,30 +230,19 @@ std::vector<float> RenderOnGl(const GlContext& gl, const GpuProgram& program, in
                                std::to_string(std::max(4, program.outputs)) + "];\n" +
                                program.body +
                                "color = vec4(result[0], result[1], result[2], result[3]);\n}\n";
-  const GlProgram linked(gl, program, vertex, fragment, "");
-  if (!linked.good()) return {};
-  GLuint texture = 0, framebuffer = 0, array = 0;
-  gl.GenTextures(1, &texture);
-  gl.ActiveTexture(GL_TEXTURE0 + 31);
-  gl.BindTexture(GL_TEXTURE_2D, texture);
-  gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, width, height, 0, GL_RGBA, GL_FLOAT, nullptr);
-  gl.GenFramebuffers(1, &framebuffer);
-  gl.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
-  gl.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture, 0);
-  EXPECT_EQ(gl.CheckFramebufferStatus(GL_FRAMEBUFFER),
-            static_cast<GLenum>(GL_FRAMEBUFFER_COMPLETE));
-  gl.GenVertexArrays(1, &array);
-  gl.BindVertexArray(array);
-  gl.Viewport(0, 0, width, height);
-  linked.Use();
-  gl.DrawArrays(GL_TRIANGLES, 0, 3);
-  std::vector<float> pixels(static_cast<size_t>(width) * height * 4);
-  gl.ReadPixels(0, 0, width, height, GL_RGBA, GL_FLOAT, pixels.data());
-  gl.BindFramebuffer(GL_FRAMEBUFFER, gl.base_framebuffer());
-  gl.DeleteFramebuffers(1, &framebuffer);
-  gl.DeleteTextures(1, &texture);
-  gl.DeleteVertexArrays(1, &array);
-  EXPECT_EQ(gl.GetError(), static_cast<GLenum>(GL_NO_ERROR));
+  return std::make_unique<GlProgram>(gl_, program, vertex, fragment, "");
+}
+
+void GlPicture::Draw(const GlProgram& program) const {
+  program.Use();
+  gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+  gl_.Finish();
+}
+
+std::vector<float> GlPicture::Pixels() const {
+  std::vector<float> pixels(static_cast<size_t>(width_) * height_ * 4);
+  gl_.ReadPixels(0, 0, width_, height_, GL_RGBA, GL_FLOAT, pixels.data());
+  EXPECT_EQ(gl_.GetError(), static_cast<GLenum>(GL_NO_ERROR));
   return pixels;
 }
 

@@ -1,6 +1,7 @@
 // Runs GpuPrograms with OpenGL.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,9 +41,28 @@ class GlProgram {
 std::vector<float> RunOnGl(const GlContext& gl, const GpuProgram& program,
                            std::span<const float> inputs);
 
-// The program's body on a picture of width x height pixels, with the statement `prologue` before
-// it; four floats a pixel, from the bottom row: result[0] to result[3].
-std::vector<float> RenderOnGl(const GlContext& gl, const GpuProgram& program, int width,
-                              int height);
+// A picture of floats to draw on. One at a time.
+class GlPicture {
+ public:
+  GlPicture(const GlContext& gl, int width, int height);
+  ~GlPicture();
+  GlPicture(const GlPicture&) = delete;
+  GlPicture& operator=(const GlPicture&) = delete;
+
+  // The program's body as a fragment shader, which may use gl_FragCoord.
+  std::unique_ptr<GlProgram> Compile(const GpuProgram& program) const;
+  // Runs it for every pixel, to the end.
+  void Draw(const GlProgram& program) const;
+  // Four floats a pixel, from the bottom row: result[0] to result[3].
+  std::vector<float> Pixels() const;
+
+ private:
+  const GlContext& gl_;
+  int width_;
+  int height_;
+  GLuint texture_ = 0;
+  GLuint framebuffer_ = 0;
+  GLuint array_ = 0;
+};
 
 }  // namespace patina::gpu_test

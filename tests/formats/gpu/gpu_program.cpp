@@ -65,6 +65,7 @@ GpuProgram LoadProgram(const Container& container, const ShaderOptions& options)
     texture.name = listed["name"];
     texture.binding = listed["binding"];
     if (listed.contains("container_file")) {
+      texture.filtered = true;
       const auto bytes = ReadFile(container.PathOf(listed["container_file"]), uint64_t{1} << 30);
       EXPECT_TRUE(bytes);
       if (bytes) texture.file = ReadDdsFile(*bytes);

@@ -23,6 +23,7 @@ struct DdsFile {
 struct GpuTexture {
   std::string name;
   int binding = 0;
+  bool filtered = false;  // between texels and levels; else read by texel
   DdsFile file;
 };
 

@@ -163,7 +163,11 @@ TEST_P(MaterialOnGl, ImplicitEntryFollowsTheScreen) {
   program.body +=
       "PatinaMaterial material = patina_material(gl_FragCoord.xy * texels / vec2(64.0, 32.0));\n"
       "for (int c = 0; c < 4; ++c) result[c] = material.value[c];\n";
-  const std::vector<float> pixels = RenderOnGl(*gl_, program, width, height);
+  const GlPicture picture(*gl_, width, height);
+  const auto compiled = picture.Compile(program);
+  ASSERT_TRUE(compiled->good());
+  picture.Draw(*compiled);
+  const std::vector<float> pixels = picture.Pixels();
   ASSERT_EQ(pixels.size(), static_cast<size_t>(width * height * 4));
   std::vector<float> expected(channels);
   for (int y = 0; y < height; ++y) {
