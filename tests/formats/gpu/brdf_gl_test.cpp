@@ -3,6 +3,7 @@
 
 #include "tests/formats/gpu/brdf_samples.h"
 #include "tests/formats/gpu/gl_runner.h"
+#include "tests/formats/sample_container.h"
 
 namespace patina::gpu_test {
 namespace {
@@ -69,6 +70,31 @@ TEST_P(BrdfOnGl, AgreesForAnyNetwork) {
     options.hidden = networks[i];
     Check(options, 140 + i, 1000);
   }
+}
+
+TEST_P(BrdfOnGl45, FitsInOneShaderWithAMaterial) {
+  const test::TemporaryDirectory folder;
+  auto staging = test::StageBrdfSample(folder.path(), "brdf", 160);
+  ASSERT_OK(staging);
+  const auto published = staging->Publish();
+  ASSERT_OK(published);
+  const auto brdf_container = OpenContainer(published->directory);
+  ASSERT_OK(brdf_container);
+  auto material_staging = test::StageSample(folder.path(), "material", 161);
+  ASSERT_OK(material_staging);
+  const auto material_published = material_staging->Publish();
+  ASSERT_OK(material_published);
+  const auto material_container = OpenContainer(material_published->directory);
+  ASSERT_OK(material_container);
+
+  const auto pairs = RandomPairs(162, 200);
+  GpuProgram brdf = LoadProgram(*brdf_container, {ShaderLanguage::kGlsl, 8});
+  SetBrdfBody(&brdf);
+  const std::vector<float> alone = RunOnGl(*gl_, brdf, pairs);
+  const GpuProgram material = LoadProgram(*material_container, {});
+  brdf.shader = material.shader + brdf.shader;
+  brdf.textures.insert(brdf.textures.end(), material.textures.begin(), material.textures.end());
+  EXPECT_EQ(RunOnGl(*gl_, brdf, pairs), alone);
 }
 
 INSTANTIATE_TEST_SUITE_P(Apis, BrdfOnGl, testing::Values(GlApi::kGl45, GlApi::kEs30),

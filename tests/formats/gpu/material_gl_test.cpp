@@ -12,6 +12,9 @@ namespace {
 
 using test::TemporaryDirectory;
 
+// Of a channel's range: pow of the driver against that of the C library.
+constexpr double kBound = 1e-4;
+
 class MaterialOnGl : public testing::TestWithParam<GlApi> {
  protected:
   void SetUp() override {
@@ -74,6 +77,42 @@ TEST_P(MaterialOnGl45, AgreesForAnyNumberOfTextures) {
 }
 
 TEST_P(MaterialOnGl45, AgreesForSignedTextures) { Check({.is_signed = true}, 60); }
+
+TEST_P(MaterialOnGl45, AgreesForACutRangeOfLevels) {
+  for (const auto& [fine, coarse] : {std::pair(1, 2), std::pair(0, 9), std::pair(9, 0)}) {
+    const TemporaryDirectory folder;
+    const Container whole = MakeMaterial(folder.path(), {.shifts = {0, 1, 2, 3}}, 65);
+    CheckMaterial(CutLevels(whole, fine, coarse), 66, 1000, Options(),
+                  [&](const GpuProgram& program, const std::vector<float>& lookups) {
+                    return RunOnGl(*gl_, program, lookups);
+                  });
+  }
+}
+
+// Two channels of one output (equal channels are learned once) keep their own range and encoding.
+TEST_P(MaterialOnGl45, ChannelsMayShareAnOutput) {
+  const TemporaryDirectory folder;
+  Container container = MakeMaterial(folder.path(), {.outputs = 6}, 67);
+  const size_t channels = container.manifest.channels.size();
+  const auto lookups = RandomLookups(68, 500, 64, 48);
+  const auto run = [&] {
+    GpuProgram program = LoadProgram(container, Options());
+    SetMaterialBody(&program, static_cast<int>(channels));
+    return RunOnGl(*gl_, program, lookups);
+  };
+  const std::vector<float> alone = run();
+  // Channel 0 is srgb, channel 5 linear: channel 5 now shows what channel 0 has, before its curve.
+  container.manifest.channels[5].output = container.manifest.channels[0].output;
+  const std::vector<float> shared = run();
+  ASSERT_EQ(alone.size(), shared.size());
+  const Decoder decoder = LoadDecoder(container);
+  for (size_t i = 0; i < lookups.size() / 8; ++i) {
+    const float* values = shared.data() + i * channels;
+    EXPECT_EQ(values[0], alone[i * channels]);
+    EXPECT_NEAR(Decoder::ToPhysical(decoder.channels()[0], values[5]), values[0],
+                kBound * PhysicalRange(decoder.channels()[0]));
+  }
+}
 
 TEST_P(MaterialOnGl45, AgreesForAnyWidth) {
   Check({.hidden = 1}, 70, 500);

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
+#include "formats/base/file_io.h"
+#include "formats/base/sha256.h"
 #include "tests/formats/sample_container.h"
 
 namespace patina::gpu_test {
@@ -145,6 +148,40 @@ Container MakeMaterial(const std::string& folder, const MaterialShape& shape, ui
   auto container = OpenContainer(*directory);
   EXPECT_TRUE(container) << container.error().message;
   return container ? std::move(*container) : Container{};
+}
+
+Container CutLevels(const Container& container, int fine, int coarse) {
+  Container cut = container;
+  const std::string path = container.PathOf(kManifestName);
+  const auto text = ReadTextFile(path, kMaxManifestBytes);
+  EXPECT_TRUE(text);
+  auto json = nlohmann::ordered_json::parse(*text);
+  for (size_t i = 0; i < cut.manifest.features.size(); ++i) {
+    ManifestFeature& feature = cut.manifest.features[i];
+    DdsTexture texture = *ReadDds(container.PathOf(feature.payload));
+    auto& levels = texture.levels;
+    const int first = std::min(fine, feature.levels - 1);
+    levels.erase(levels.begin(), levels.begin() + first);
+    levels.resize(std::max<size_t>(1, levels.size() - std::min<size_t>(levels.size(), coarse)));
+    feature.width = DdsLevelSide(feature.width, first);
+    feature.height = DdsLevelSide(feature.height, first);
+    feature.levels = static_cast<int>(levels.size());
+    feature.lod_bias -= first;
+    const auto bytes = EncodeDds(texture.format, feature.width, feature.height, levels);
+    EXPECT_TRUE(bytes && WriteFileDurably(container.PathOf(feature.payload), *bytes));
+    for (ManifestPayload& payload : cut.manifest.payloads) {
+      if (payload.name != feature.payload) continue;
+      payload.bytes = bytes->size();
+      payload.sha256 = Sha256Hex(*bytes);
+    }
+    auto& listed = json["features"][i];
+    listed["width"] = feature.width;
+    listed["height"] = feature.height;
+    listed["levels"] = feature.levels;
+    listed["lod_bias"] = feature.lod_bias;
+  }
+  EXPECT_TRUE(WriteFileDurably(path, json.dump(2)));
+  return cut;
 }
 
 std::vector<float> RandomLookups(uint64_t seed, size_t count, int width, int height) {

@@ -26,6 +26,10 @@ struct MaterialShape {
 // scaled in turns, ranges that clamp about every tenth value. Fails the current test on an error.
 Container MakeMaterial(const std::string& folder, const MaterialShape& shape, uint64_t seed);
 
+// The same container with only a part of each texture's levels, as of a material that is seen from
+// some distances only: so many fine and coarse ones are cut off (one level stays).
+Container CutLevels(const Container& container, int fine, int coarse);
+
 // Random (u, v, s): eight floats each, of which the first three count. Positions beyond the edges,
 // levels beyond both ends of the chain; a share of them on texel centres and whole levels.
 std::vector<float> RandomLookups(uint64_t seed, size_t count, int width, int height);
