@@ -14,6 +14,7 @@ constexpr uint32_t kMagic = 0x20534444;  // "DDS "
 constexpr uint32_t kDx10 = 0x30315844;   // "DX10"
 constexpr uint32_t kFlags =
     0x000A1007;  // caps, height, width, pixel format, mip map count, linear size
+constexpr uint32_t kDataFlags = 0x0002100F;  // the same with a pitch in place of the linear size
 constexpr uint32_t kPixelFormatFourCc = 0x4;
 constexpr uint32_t kCapsTexture = 0x1000;
 constexpr uint32_t kCapsComplexMipmap = 0x400008;
@@ -43,6 +44,27 @@ enum Offset : int {
 uint64_t LevelBlocks(int width, int height, int level) {
   return static_cast<uint64_t>(DdsBlocks(DdsLevelSide(width, level))) *
          static_cast<uint64_t>(DdsBlocks(DdsLevelSide(height, level)));
+}
+
+// Fills a zeroed header. size: bytes of level 0 with kFlags, of a row with kDataFlags.
+void PutHeader(uint8_t* bytes, uint32_t flags, uint32_t size, int width, int height, size_t levels,
+               uint32_t dxgi_format) {
+  const auto put = [&](int offset, uint32_t value) { StoreLittle32(bytes + offset, value); };
+  put(kMagicAt, kMagic);
+  put(kSizeAt, 124);
+  put(kFlagsAt, flags);
+  put(kHeightAt, static_cast<uint32_t>(height));
+  put(kWidthAt, static_cast<uint32_t>(width));
+  put(kLinearSizeAt, size);
+  put(kDepthAt, 1);
+  put(kMipCountAt, static_cast<uint32_t>(levels));
+  put(kPixelFormatSizeAt, 32);
+  put(kPixelFormatFlagsAt, kPixelFormatFourCc);
+  put(kFourCcAt, kDx10);
+  put(kCapsAt, kCapsTexture | (levels > 1 ? kCapsComplexMipmap : 0));
+  put(kDxgiFormatAt, dxgi_format);
+  put(kDimensionAt, kDimensionTexture2d);
+  put(kArraySizeAt, 1);
 }
 
 std::string SizeText(int64_t width, int64_t height) {
@@ -94,27 +116,25 @@ Result<std::vector<uint8_t>> EncodeDds(bc6h::Format format, int width, int heigh
   }
 
   std::vector<uint8_t> bytes(total, 0);
-  const auto put = [&](int offset, uint32_t value) { StoreLittle32(bytes.data() + offset, value); };
-  put(kMagicAt, kMagic);
-  put(kSizeAt, 124);
-  put(kFlagsAt, kFlags);
-  put(kHeightAt, static_cast<uint32_t>(height));
-  put(kWidthAt, static_cast<uint32_t>(width));
-  put(kLinearSizeAt, static_cast<uint32_t>(linear_bytes));
-  put(kDepthAt, 1);
-  put(kMipCountAt, static_cast<uint32_t>(levels.size()));
-  put(kPixelFormatSizeAt, 32);
-  put(kPixelFormatFlagsAt, kPixelFormatFourCc);
-  put(kFourCcAt, kDx10);
-  put(kCapsAt, kCapsTexture | (levels.size() > 1 ? kCapsComplexMipmap : 0));
-  put(kDxgiFormatAt, static_cast<uint32_t>(format));
-  put(kDimensionAt, kDimensionTexture2d);
-  put(kArraySizeAt, 1);
+  PutHeader(bytes.data(), kFlags, static_cast<uint32_t>(linear_bytes), width, height, levels.size(),
+            static_cast<uint32_t>(format));
   uint8_t* out = bytes.data() + kDdsHeaderBytes;
   for (const auto& level : levels) {
     std::memcpy(out, level.data(), level.size() * sizeof(bc6h::Block));
     out += level.size() * sizeof(bc6h::Block);
   }
+  return bytes;
+}
+
+std::vector<uint8_t> EncodeDataDds(DataFormat format, int width, int height,
+                                   std::span<const uint8_t> texels) {
+  const int texel_bytes = DataTexelBytes(format);
+  PATINA_CHECK(width >= 1 && height >= 1 &&
+               texels.size() == static_cast<size_t>(width) * height * texel_bytes);
+  std::vector<uint8_t> bytes(kDdsHeaderBytes + texels.size(), 0);
+  PutHeader(bytes.data(), kDataFlags, static_cast<uint32_t>(width * texel_bytes), width, height, 1,
+            static_cast<uint32_t>(format));
+  std::memcpy(bytes.data() + kDdsHeaderBytes, texels.data(), texels.size());
   return bytes;
 }
 

@@ -48,6 +48,26 @@ Status WriteDds(const std::string& path, bc6h::Format format, int width, int hei
                 std::span<const std::vector<bc6h::Block>> levels);
 Result<DdsTexture> ReadDds(const std::string& path, uint64_t max_bytes = uint64_t{8} << 30);
 
+// Textures of plain numbers that shaders fetch by texel; the values are DXGI formats.
+enum class DataFormat : uint32_t {
+  kRgba32Float = 2,
+  kRgba16Float = 10,
+  kR32Uint = 42,
+  kR16Uint = 57
+};
+
+constexpr int DataTexelBytes(DataFormat format) {
+  return format == DataFormat::kRgba32Float   ? 16
+         : format == DataFormat::kRgba16Float ? 8
+         : format == DataFormat::kR32Uint     ? 4
+                                              : 2;
+}
+
+// The bytes of a file with one level: the 148-byte header with the DXGI format, then the texels,
+// little-endian, row by row without padding. Sides >= 1; texels has exactly the level's bytes.
+std::vector<uint8_t> EncodeDataDds(DataFormat format, int width, int height,
+                                   std::span<const uint8_t> texels);
+
 // The texels of a level as bits of halves: [y][x][rgb], row-major.
 std::vector<uint16_t> DecodeDdsLevel(const DdsTexture& texture, int level);
 

@@ -886,7 +886,7 @@ class Decoder {
               float* to = level.texels.data() +
                           static_cast<size_t>(y) * static_cast<size_t>(level.width) + x;
               for (size_t c = 0; c < 3; ++c) {
-                if (!HalfIsFinite(rgb[c]))
+                if (!decoder_detail::HalfIsFinite(rgb[c]))
                   return failure->Set(LoadStatus::kCorrupt, path + ": a texel is infinite");
                 to[c * plane] = values[rgb[c]];
               }
@@ -939,7 +939,7 @@ class Decoder {
           const size_t at = static_cast<size_t>(offset) + 2 * e;
           const auto half = static_cast<uint16_t>(static_cast<uint8_t>(bytes[at]) |
                                                   static_cast<uint8_t>(bytes[at + 1]) << 8);
-          if (!HalfIsFinite(half)) return corrupt("tensor " + name + " holds a non-finite weight");
+          if (!decoder_detail::HalfIsFinite(half)) return corrupt("tensor " + name + " holds a non-finite weight");
           values->push_back(HalfValues()[half]);
         }
         return true;

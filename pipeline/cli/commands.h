@@ -16,6 +16,7 @@ int InfoCommand(const CommandLine& line);
 int CompareCommand(const CommandLine& line, const CancelToken& cancel);
 int EvalCommand(const CommandLine& line);
 int SampleCommand(const CommandLine& line);
+int ShaderCommand(const CommandLine& line);
 
 // "patina: error: <message>" on standard error.
 void PrintError(const std::string& message);

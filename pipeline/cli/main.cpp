@@ -49,6 +49,8 @@ int Dispatch(const CommandLine& line) {
       return EvalCommand(line);
     case Command::kSample:
       return SampleCommand(line);
+    case Command::kShader:
+      return ShaderCommand(line);
     case Command::kSubmit:
       return SubmitCommand(line.client, g_cancel);
     case Command::kJobs:

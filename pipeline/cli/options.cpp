@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 
+#include "formats/shader_package.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
 #include "pipeline/jobs/sample_set.h"
@@ -24,6 +25,7 @@ constexpr const char* kExamples =
     "  patina compare baked/sample sample               measure a container against its source "
     "again\n"
     "  patina eval baked/chrome --pairs pairs.csv       values of a BRDF\n"
+    "  patina shader baked/wall --out shaders           what a GPU needs to decode it\n"
     "  patina submit textures/wall --wait               the same by a daemon (see patinad --help)\n"
     "\n"
     "`patina COMMAND --help` explains a command. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 "
@@ -313,6 +315,37 @@ void AddSample(CLI::App* app, CommandLine* line) {
   command->callback([line] { line->command = Command::kSample; });
 }
 
+void AddShader(CLI::App* app, CommandLine* line) {
+  CLI::App* command = app->add_subcommand(
+      "shader", "Write the shader and the tables that decode a container on a GPU");
+  ShaderCommandOptions& o = line->shader;
+  command
+      ->add_option("CONTAINER", o.container,
+                   "A container, or the folder of an asset (its current container)")
+      ->required();
+  command->add_option("-o,--out", o.out, "Folder for the files")->required()->type_name("DIR");
+  command
+      ->add_option("--lang", o.language,
+                   "glsl (default; 450, for OpenGL and Vulkan), essl (OpenGL ES 3.00) or hlsl "
+                   "(shader model 5 and newer)")
+      ->check(CLI::IsMember({"glsl", "essl", "hlsl"}));
+  command
+      ->add_option("--first-binding", o.first_binding,
+                   "Binding or register of the first texture; the others follow (default 0)")
+      ->check(CLI::Range(0, kMaxFirstBinding))
+      ->type_name("N");
+  AddCommon(command, line, false);
+  command->footer(
+      "Written are material.glsl or brdf.glsl (.hlsl), one file to include; its weights as the "
+      "bytes of a constant\n"
+      "buffer; of a BRDF the tables as textures; and bindings.json, which says what to bind where. "
+      "A material's features\n"
+      "are bound as they lie in the container. formats/ENGINE.md is the guide.\n"
+      "Example:\n"
+      "  patina shader baked/wall --out shaders/wall --lang hlsl");
+  command->callback([line] { line->command = Command::kShader; });
+}
+
 CLI::App* AddClient(CLI::App* app, CommandLine* line, Command which, const char* name,
                     const char* description) {
   CLI::App* command =
@@ -436,6 +469,7 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   AddCompare(&app, &line);
   AddEval(&app, &line);
   AddSample(&app, &line);
+  AddShader(&app, &line);
   AddClientCommands(&app, &line);
   std::string topic;
   CLI::App* help = app.add_subcommand("help", "Explain a command");

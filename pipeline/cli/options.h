@@ -76,6 +76,13 @@ struct SampleOptions {
   uint64_t seed = 1;
 };
 
+struct ShaderCommandOptions {
+  std::string container;
+  std::string out;
+  std::string language = "glsl";  // "glsl", "essl", "hlsl"
+  int first_binding = 0;
+};
+
 enum class Command {
   kBake,
   kRun,
@@ -84,6 +91,7 @@ enum class Command {
   kCompare,
   kEval,
   kSample,
+  kShader,
   // Of a daemon's client.
   kSubmit,
   kJobs,
@@ -103,6 +111,7 @@ struct CommandLine {
   CompareOptions compare;
   EvalOptions eval;
   SampleOptions sample;
+  ShaderCommandOptions shader;
   ClientOptions client;
   bool json = false;
   Verbosity verbosity = Verbosity::kNormal;
