@@ -10,6 +10,11 @@ namespace {
 constexpr double kLinearKnee = 0.0031308;
 constexpr double kCodedKnee = 0.04045;
 
+constexpr double kRec709Gain = 1.09929682680944;
+constexpr double kRec709Knee = 0.018053968510807;
+constexpr double kRec709Slope = 4.5;
+constexpr double kRec709Power = 0.45;
+
 // Decoding is smooth: a uniform table with linear interpolation errs by h^2/8 max f'' = 2.2e-8 at
 // 4096 cells.
 struct DecodeTable {
@@ -98,6 +103,23 @@ double LinearToSrgb(double linear) {
   const double magnitude = std::fabs(linear);
   const double coded =
       magnitude <= kLinearKnee ? magnitude * 12.92 : 1.055 * std::pow(magnitude, 1 / 2.4) - 0.055;
+  return std::copysign(coded, linear);
+}
+
+double Rec709ToLinear(double coded) {
+  const double magnitude = std::fabs(coded);
+  const double linear =
+      magnitude < kRec709Slope * kRec709Knee
+          ? magnitude / kRec709Slope
+          : std::pow((magnitude + (kRec709Gain - 1)) / kRec709Gain, 1 / kRec709Power);
+  return std::copysign(linear, coded);
+}
+
+double LinearToRec709(double linear) {
+  const double magnitude = std::fabs(linear);
+  const double coded = magnitude < kRec709Knee
+                           ? magnitude * kRec709Slope
+                           : kRec709Gain * std::pow(magnitude, kRec709Power) - (kRec709Gain - 1);
   return std::copysign(coded, linear);
 }
 
