@@ -133,4 +133,16 @@ void LinearToSrgbRow(const float* in, size_t count, float* out) {
   for (size_t i = 0; i < count; ++i) out[i] = EncodeOne(in[i]);
 }
 
+void SignedLogRow(const float* in, size_t count, float scale, float* out) {
+  for (size_t i = 0; i < count; ++i) {
+    const double x = static_cast<double>(in[i]);
+    out[i] = static_cast<float>(
+        std::copysign(std::log2(1 + std::fabs(x) / static_cast<double>(scale)), x));
+  }
+}
+
+double SignedLogToLinear(double coded, double scale) {
+  return std::copysign(scale * (std::exp2(std::fabs(coded)) - 1), coded);
+}
+
 }  // namespace patina

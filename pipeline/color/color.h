@@ -20,6 +20,11 @@ double LinearToSrgb(double linear);
 double Rec709ToLinear(double coded);
 double LinearToRec709(double linear);
 
+// The encoding signed_log of containers: coded = sign(x) log2(1 + |x| / scale), and back. For
+// scale > 0; linear below scale, logarithmic beyond.
+void SignedLogRow(const float* in, size_t count, float scale, float* out);
+double SignedLogToLinear(double coded, double scale);
+
 // Rounded from the exact curve: coded = code / 255.
 float Srgb8ToLinear(uint8_t code);
 

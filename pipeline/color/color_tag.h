@@ -26,10 +26,10 @@ bool AreClose(const TransferCurve& a, const TransferCurve& b, double tolerance);
 
 // Empty (`origin` empty): the file says nothing that can be followed.
 struct ColorTag {
-  std::string origin;  // for messages: "its gAMA chunk", "its ICC profile \"Display P3\""
-  std::string name;    // of a colour space; if empty, primaries and curve say it
+  std::string origin;  // for messages: "gAMA and cHRM", "ICC profile \"Display P3\""
   Primaries primaries = kRec709Primaries;
   TransferCurve curve;
+  std::string problem;  // why something that is there is not followed; a sentence's end
 
   bool empty() const { return origin.empty(); }
 };

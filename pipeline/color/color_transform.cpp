@@ -76,7 +76,7 @@ void ColorTransform::Apply(float* r, float* g, float* b, size_t count) const {
 
 ColorTransformPtr TransformFromTag(const TransferCurve& curve, const Primaries& from,
                                    const Primaries& to) {
-  const auto matrix = AreClose(from, to, 0) ? kIdentity3 : ConversionMatrix(from, to);
+  const auto matrix = from == to ? kIdentity3 : ConversionMatrix(from, to);
   if (!matrix) return nullptr;
   return std::make_shared<CurveAndMatrix>(curve, *matrix);
 }

@@ -83,12 +83,13 @@ std::optional<Matrix3> ConversionMatrix(const Primaries& from, const Primaries& 
   return Multiply(*Inverse(*target), Multiply(white, *source));
 }
 
-bool AreClose(const Primaries& a, const Primaries& b, double tolerance) {
-  const auto near = [tolerance](const Chromaticity& p, const Chromaticity& q) {
-    return std::fabs(p.x - q.x) <= tolerance && std::fabs(p.y - q.y) <= tolerance;
-  };
-  return near(a.red, b.red) && near(a.green, b.green) && near(a.blue, b.blue) &&
-         near(a.white, b.white);
+bool AreSameSpace(const Primaries& a, const Primaries& b, double tolerance) {
+  const auto matrix = ConversionMatrix(a, b);
+  if (!matrix) return false;
+  for (int i = 0; i < 9; ++i) {
+    if (!(std::fabs((*matrix)[i] - kIdentity3[i]) <= tolerance)) return false;
+  }
+  return true;
 }
 
 const char* WorkingSpaceName(WorkingSpace space) {

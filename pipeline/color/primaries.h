@@ -14,10 +14,12 @@ namespace patina {
 struct Chromaticity {
   double x = 0;
   double y = 0;
+  bool operator==(const Chromaticity&) const = default;
 };
 
 struct Primaries {
   Chromaticity red, green, blue, white;
+  bool operator==(const Primaries&) const = default;
 };
 
 inline constexpr Primaries kRec709Primaries{
@@ -41,8 +43,9 @@ std::optional<Matrix3> RgbToXyz(const Primaries& primaries);
 // RGB of one space to RGB of another, adapted to its white by Bradford. nullopt as above.
 std::optional<Matrix3> ConversionMatrix(const Primaries& from, const Primaries& to);
 
-// Whether each coordinate is within `tolerance`.
-bool AreClose(const Primaries& a, const Primaries& b, double tolerance);
+// Whether the matrix between them is that of no change, to `tolerance` in each entry. Primaries
+// that are given for another white, as ICC profiles do, compare as what they mean.
+bool AreSameSpace(const Primaries& a, const Primaries& b, double tolerance);
 
 // What physical colours of a container are. Names reach jobs and manifests.
 enum class WorkingSpace { kLinearRec709, kAcesCg };

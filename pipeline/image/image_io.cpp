@@ -19,6 +19,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/half.h"
+#include "pipeline/image/file_tags.h"
 
 namespace patina {
 namespace {
@@ -205,10 +206,26 @@ Status CheckSize(const std::string& path, const OIIO::ImageSpec& spec, const Sou
   return {};
 }
 
-std::string ColorHint(const OIIO::ImageSpec& spec) {
-  std::string hint = spec.get_string_attribute("ICCProfile:profile_description");
-  if (hint.empty()) hint = spec.get_string_attribute("oiio:ColorSpace");
-  return OneLine(hint);
+// The library's own "oiio:ColorSpace" does not count: its readers make one up where a file is silent.
+ColorTag TagOf(const std::string& path, const std::string& format, const OIIO::ImageSpec& spec) {
+  ColorTag tag;
+  const OIIO::ParamValue* icc = spec.find_attribute("ICCProfile");
+  if (icc != nullptr && icc->type().basetype == OIIO::TypeDesc::UINT8) {
+    tag = TagFromIccProfile({static_cast<const uint8_t*>(icc->data()), icc->type().size()});
+    if (!tag.empty()) return tag;
+  }
+  ColorTag other;
+  if (format == "png") other = TagFromPngChunks(path);
+  if (format == "openexr") {
+    const OIIO::ParamValue* found = spec.find_attribute("chromaticities");
+    if (found != nullptr && found->type().basetype == OIIO::TypeDesc::FLOAT &&
+        found->type().basevalues() == 8) {
+      other = TagFromChromaticities(
+          std::span<const float, 8>(static_cast<const float*>(found->data()), 8));
+    }
+  }
+  if (other.problem.empty()) other.problem = tag.problem;
+  return other;
 }
 
 // Opens the first part and leaves it selected.
@@ -242,7 +259,7 @@ Result<OpenImage> Open(const std::string& path) {
   info.width = spec.width;
   info.height = spec.height;
   info.channels = spec.nchannels;
-  info.color_hint = ColorHint(spec);
+  info.color_tag = TagOf(path, file.format, spec);
   for (int c = 0; c < std::min(spec.nchannels, kMaxLoadedChannels); ++c) {
     SampleType type;
     if (!SampleTypeOf(spec.channelformat(c), &type)) {
