@@ -74,6 +74,16 @@ void ColorTransform::Apply(float* r, float* g, float* b, size_t count) const {
   }
 }
 
+bool IsProportional(const ColorTransform& transform) {
+  std::array<float, 3> r{0.2f, 0.4f, 0.8f}, g = r, b = r;
+  transform.Apply(r.data(), g.data(), b.data(), r.size());
+  const auto proportional = [](const std::array<float, 3>& v) {
+    return std::fabs(v[1] - 2 * v[0]) <= 1e-3f * std::fabs(v[1]) &&
+           std::fabs(v[2] - 2 * v[1]) <= 1e-3f * std::fabs(v[2]);
+  };
+  return proportional(r) && proportional(g) && proportional(b);
+}
+
 ColorTransformPtr TransformFromTag(const TransferCurve& curve, const Primaries& from,
                                    const Primaries& to) {
   const auto matrix = from == to ? kIdentity3 : ConversionMatrix(from, to);

@@ -27,6 +27,9 @@ class ColorTransform {
 };
 using ColorTransformPtr = std::shared_ptr<const ColorTransform>;
 
+// Whether it makes twice as much of twice as much grey: of linear light, to linear light.
+bool IsProportional(const ColorTransform& transform);
+
 // Curve, then matrix. nullptr if the primaries span no triangle.
 ColorTransformPtr TransformFromTag(const TransferCurve& curve, const Primaries& from,
                                    const Primaries& to);

@@ -1,6 +1,5 @@
 #include "pipeline/material/color_choice.h"
 
-#include <cmath>
 #include <cstdio>
 
 namespace patina {
@@ -9,17 +8,6 @@ namespace {
 // ICC profiles round to 1/65536 and adapt the white in their own ways.
 constexpr double kSamePrimaries = 2e-3;
 constexpr double kSameCurve = 1e-3;
-
-bool IsLinearLight(const ColorTransformPtr& transform) {
-  if (transform == nullptr) return true;
-  float r[3] = {0.2f, 0.4f, 0.8f}, g[3] = {0.2f, 0.4f, 0.8f}, b[3] = {0.2f, 0.4f, 0.8f};
-  transform->Apply(r, g, b, 3);
-  const auto proportional = [](const float* v) {
-    return std::fabs(v[1] - 2 * v[0]) <= 1e-3f * std::fabs(v[1]) &&
-           std::fabs(v[2] - 2 * v[1]) <= 1e-3f * std::fabs(v[2]);
-  };
-  return proportional(r) && proportional(g) && proportional(b);
-}
 
 std::string InWords(const Primaries& p, const TransferCurve& curve) {
   char text[160];
@@ -57,7 +45,7 @@ class Chooser {
     ColorChoice choice;
     choice.space = space.name;
     PATINA_ASSIGN(choice.transform, options_.config.ToWorking(space, options_.working));
-    choice.linear_light = IsLinearLight(choice.transform);
+    choice.linear_light = IsProportional(*choice.transform);
     return choice;
   }
 

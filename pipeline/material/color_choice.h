@@ -12,11 +12,16 @@
 
 namespace patina {
 
+// When float colours are learned as logarithms. Jobs leave it at kByRange (see ChooseEncodings);
+// the others are for measurements of that rule.
+enum class LogEncoding { kByRange, kNever, kAlways };
+
 // How colours are read. The same for all maps of a material.
 struct ColorOptions {
   WorkingSpace working = WorkingSpace::kLinearRec709;
   ColorConfig config = ColorConfig::Builtin();
   std::string space = "auto";  // of every colour map that no list gives one; see MapSource
+  LogEncoding logarithms = LogEncoding::kByRange;
 };
 
 // Who said which space it is, the first of these that says anything. Names reach manifests.

@@ -80,7 +80,7 @@ ValueStats Measure(const MapPlan& plan, const LoadedFile& file, int width, int h
 
 Status ChooseEncodings(const std::vector<LoadedFile>& files,
                        const std::vector<ReferenceFile>& descriptions, int width, int height,
-                       ThreadPool& pool, std::vector<MapPlan>* plans) {
+                       LogEncoding logarithms, ThreadPool& pool, std::vector<MapPlan>* plans) {
   for (MapPlan& plan : *plans) {
     if (plan.role->kind != MapKind::kColor) continue;
     const ReferenceFile& described = descriptions[plan.file];
@@ -98,7 +98,9 @@ Status ChooseEncodings(const std::vector<LoadedFile>& files,
       continue;
     }
     const float median = stats.Median();
-    if (!floats || !(stats.peak > kMinHdrPeak) || !(stats.peak > kMinHdrRange * median)) continue;
+    const bool wide = stats.peak > kMinHdrPeak && stats.peak > kMinHdrRange * median;
+    if (!floats || median == 0 || logarithms == LogEncoding::kNever) continue;
+    if (!wide && logarithms != LogEncoding::kAlways) continue;
     plan.encoding = Encoding::kSignedLog;
     plan.scale = std::clamp(std::exp2(std::floor(std::log2(median))), 0x1p-100f, 0x1p100f);
   }

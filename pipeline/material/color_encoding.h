@@ -13,7 +13,7 @@ namespace patina {
 // Logarithms are learned in place of scaled values where the largest |value| of a float map is
 // above kMinHdrPeak and more than kMinHdrRange times the median of those that are not 0: then an
 // error of one part in a hundred of the largest is more than everything ordinary. Both were
-// measured with tests/bench/hdr_encoding.
+// measured with `patina_hdr_bench`.
 inline constexpr float kMinHdrPeak = 4;
 inline constexpr float kMinHdrRange = 64;
 
@@ -24,6 +24,6 @@ inline constexpr float kMinHdrRange = 64;
 // Looks at mip 0 once for each of them. Error: kCorruptData (a conversion gives NaN or infinity).
 Status ChooseEncodings(const std::vector<LoadedFile>& files,
                        const std::vector<ReferenceFile>& descriptions, int width, int height,
-                       ThreadPool& pool, std::vector<MapPlan>* plans);
+                       LogEncoding logarithms, ThreadPool& pool, std::vector<MapPlan>* plans);
 
 }  // namespace patina

@@ -66,7 +66,8 @@ class Builder {
   Result<SourceReference> Run() {
     Report(0);
     PATINA_TRY(
-        ChooseEncodings(files_, result_.files, result_.width, result_.height, pool_, &plans_));
+        ChooseEncodings(files_, result_.files, result_.width, result_.height,
+                        options_.color.logarithms, pool_, &plans_));
     MeasureMip0();
     DescribeChannels();
     DescribeMaps();
