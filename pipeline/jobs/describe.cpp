@@ -116,7 +116,7 @@ std::string ContainerText(const Container& container) {
   if (m.color_config) {
     text += ", configuration " +
             (m.color_config->file.empty() ? "built in" : m.color_config->file) + " (" +
-            m.color_config->source + ", sha256 " + m.color_config->sha256.substr(0, 12) + "...)";
+            (m.color_config->source == "environment" ? "of $OCIO, " : "") + "sha256 " + m.color_config->sha256.substr(0, 12) + "...)";
   }
   text += "\n";
   for (const ManifestMap& map : m.maps) {

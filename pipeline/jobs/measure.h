@@ -34,7 +34,7 @@ struct Measurement {
 // base colour, normal, packed set has nine. Overall: from the mean of that over all mips from 0
 // down to 1x1, each mip with the same weight (Weinreich 2024). mean_mips: the mean of the PSNRs of
 // the mips. SSIM, FLIP (of the base colour, or the first colour map) and the angle between normals:
-// mip 0 only, for time.
+// mip 0 only, for time; colours of another working space are taken for Rec.709 there.
 //
 // preview: null, or receives pictures of mip 0.
 // Errors: kNotFound, kCorruptData, kUnsupported, kResourceExhausted from the decoder; kConflict
