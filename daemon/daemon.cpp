@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <random>
 
@@ -47,6 +49,17 @@ std::vector<std::string> WorkerEnvironment() {
   return kept;
 }
 
+// The colour configuration of jobs that name none is the operator's: where it lies is not asked.
+void PassOnColorConfig(LocalExecutorOptions* options) {
+  const char* named = std::getenv("OCIO");
+  if (named == nullptr || *named == '\0') return;
+  // Jobs run in folders of their own.
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::weakly_canonical(named, error);
+  options->environment.push_back("OCIO=" + (error ? named : path.string()));
+  if (!error) options->read.push_back(path.parent_path().string());
+}
+
 void PrintProblems(const LoadedConfig& loaded) {
   for (const ConfigProblem& warning : loaded.warnings)
     std::fprintf(stderr, "patinad: warning: %s: %s\n", warning.where.c_str(),
@@ -72,6 +85,7 @@ LocalExecutorOptions ExecutorOptions(const Config& config) {
   options.worker = config.worker;
   options.nice = config.nice;
   options.environment = WorkerEnvironment();
+  PassOnColorConfig(&options);
   using Sandbox = LocalExecutorOptions::Sandbox;
   options.sandbox = config.sandbox == SandboxMode::kOff       ? Sandbox::kOff
                     : config.sandbox == SandboxMode::kRequire ? Sandbox::kRequired

@@ -35,8 +35,9 @@ usage: patinad --watch DIR --out DIR [OPTION...]
   -V, --version
 
 Flags come over environment (PATINA_WATCH=DIR:DIR, PATINA_OUT, PATINA_STATE_DIR, ...), and that
-over the file. Signals: HUP reads the configuration again; TERM and INT stop, after the running
-jobs have ended or been put back into the queue; a second one does not wait for them.
+over the file. $OCIO names the OpenColorIO configuration of jobs that name none. Signals: HUP reads
+the configuration again; TERM and INT stop, after the running jobs have ended or been put back into
+the queue; a second one does not wait for them.
 
 Exit codes: 0 stopped or all is well, 1 failed, 2 wrong usage, 3 wrong configuration.
 

@@ -120,6 +120,8 @@ ordered_json MapsToJson(const std::vector<ManifestMap>& maps) {
     entry["type"] = map.type;
     entry["inverted"] = map.inverted;
     entry["transfer"] = map.transfer;
+    if (!map.color_space.empty()) entry["color_space"] = map.color_space;
+    if (!map.color_rule.empty()) entry["color_rule"] = map.color_rule;
     json.push_back(std::move(entry));
   }
   return json;
@@ -326,6 +328,8 @@ void ReadMaps(const JsonView& json, std::vector<ManifestMap>* maps) {
     map.type = entry.Field("type").String();
     map.inverted = entry.Field("inverted").Bool();
     map.transfer = entry.Field("transfer").String();
+    if (const JsonView space = entry.Optional("color_space")) map.color_space = space.String();
+    if (const JsonView rule = entry.Optional("color_rule")) map.color_rule = rule.String();
     maps->push_back(std::move(map));
   });
 }
@@ -443,6 +447,27 @@ void ReadBrdfQuality(const JsonView& json, JsonProblem* problem, ManifestBrdfQua
   });
 }
 
+ordered_json ColorToJson(const Manifest& manifest) {
+  ordered_json json;
+  json["working_space"] = manifest.working_space;
+  if (manifest.color_config) {
+    json["config"]["source"] = manifest.color_config->source;
+    if (!manifest.color_config->file.empty()) json["config"]["file"] = manifest.color_config->file;
+    json["config"]["sha256"] = manifest.color_config->sha256;
+  }
+  return json;
+}
+
+void ReadColor(const JsonView& json, Manifest* manifest) {
+  manifest->working_space = json.Field("working_space").String();
+  const JsonView config = json.Optional("config");
+  if (!config) return;
+  manifest->color_config.emplace();
+  manifest->color_config->source = config.Field("source").String();
+  if (const JsonView file = config.Optional("file")) manifest->color_config->file = file.String();
+  manifest->color_config->sha256 = config.Field("sha256").String();
+}
+
 ordered_json LeftOutToJson(const std::vector<ManifestLeftOut>& left_outs) {
   ordered_json json = ordered_json::array();
   for (const ManifestLeftOut& left_out : left_outs) {
@@ -479,13 +504,20 @@ Status CheckVersion(const JsonView& json, const JsonProblem& problem) {
 
 }  // namespace
 
+int FormatVersionOf(const Manifest& manifest) {
+  const bool logarithms =
+      std::any_of(manifest.channels.begin(), manifest.channels.end(),
+                  [](const ManifestChannel& channel) { return channel.encoding == "signed_log"; });
+  return logarithms || manifest.working_space != "lin_rec709" ? 2 : 1;
+}
+
 Result<std::string> ToJson(const Manifest& manifest) {
   if (auto status = CheckManifest(manifest); !status) {
     return Fail(ErrorCode::kInvalidArgument, std::move(status).error().message);
   }
   ordered_json json;
   json["format"] = kFormatName;
-  json["format_version"] = kManifestVersion;
+  json["format_version"] = FormatVersionOf(manifest);
   json["kind"] = manifest.kind;
   json["asset"] = manifest.asset;
   json["tool"]["name"] = manifest.tool.name;
@@ -506,7 +538,7 @@ Result<std::string> ToJson(const Manifest& manifest) {
     json["channels"] = ChannelsToJson(manifest.channels);
     json["maps"] = MapsToJson(manifest.maps);
   }
-  json["color"]["working_space"] = manifest.working_space;
+  json["color"] = ColorToJson(manifest);
   if (manifest.brdf) {
     json["quality"] = BrdfQualityToJson(manifest.brdf->quality);
   } else {
@@ -550,7 +582,7 @@ Result<Manifest> ParseManifest(std::string_view text) {
   manifest.seed = json.Field("seed").Unsigned();
   manifest.quality_setting = json.Field("quality_setting").String();
   ReadPayloads(json.Field("payloads"), &manifest.payloads);
-  manifest.working_space = json.Field("color").Field("working_space").String();
+  ReadColor(json.Field("color"), &manifest);
   if (manifest.kind == "brdf") {
     manifest.brdf.emplace();
     ReadBrdfSource(json.Field("source"), &*manifest.brdf);

@@ -16,7 +16,10 @@
 
 namespace patina {
 
-inline constexpr int kManifestVersion = 1;
+// What readers read up to. Written is the lowest version whose readers decode the container
+// rightly: 2 for channels of encoding "signed_log" and for working spaces other than "lin_rec709",
+// else 1.
+inline constexpr int kManifestVersion = 2;
 inline constexpr size_t kMaxManifestBytes = size_t{8} << 20;  // readers refuse larger files
 inline constexpr int kMaxManifestFeatures = 16;
 inline constexpr int kMaxManifestHidden = 256;
@@ -87,12 +90,14 @@ struct ManifestChannel {
   std::string map;  // role: "albedo", "normal", "ao", "roughness", "metalness", "displacement", ...
   std::string component;  // "r", "g", "b", "x", "y", or "" for a map of one channel
   std::string encoding =
-      "linear";         // "linear", "srgb" or "normal_xy": coded value -> physical value
+      "linear";  // "linear", "srgb", "normal_xy" or "signed_log": coded value -> physical value
   float range_min = 0;  // coded; decoders clamp to it
   float range_max = 1;
   int output = -1;     // output of the network, or -1 for a constant
   float constant = 0;  // coded; used when output < 0
-  float scale = 1;     // of "linear": physical value = coded value * scale; > 0
+  // > 0. Of "linear": physical value = coded value * scale. Of "signed_log": physical value =
+  // scale * sign(coded) * (exp2(|coded|) - 1).
+  float scale = 1;
 };
 
 // How a map was stored in the source, so that it can be written back the same way.
@@ -104,6 +109,16 @@ struct ManifestMap {
   std::string type;       // as ManifestSourceFile::type
   bool inverted = false;  // the file holds 1 - value (glossiness for roughness)
   std::string transfer = "linear";  // "linear" or "srgb": what the file's numbers are
+  // Of colours baked since 0.2; empty for data.
+  std::string color_space;  // that the file's numbers are in, by the name of the configuration
+  std::string color_rule;  // "list", "option", "name", "tag", "file_rule" or "default": who said so
+};
+
+// The OpenColorIO configuration that a material was baked with.
+struct ManifestColorConfig {
+  std::string source;  // "builtin", "environment", "file"
+  std::string file;    // its name without folders; empty if built in
+  std::string sha256;  // of its text and all its tables
 };
 
 // Measures of a map, at one mip or over all. Absent if not measured; infinity (written as null) for
@@ -226,12 +241,16 @@ struct Manifest {
   std::vector<ManifestChannel> channels;     // [material]
   std::vector<ManifestMap> maps;             // [material]
   std::optional<ManifestBrdf> brdf;          // of kind "brdf", and only there
-  std::string working_space = "lin_rec709";  // of physical colour values
-  ManifestQuality quality;                   // [material]
-  ManifestTraining training;                 // [material]
+  std::string working_space = "lin_rec709";  // of physical colour values; or "acescg"
+  std::optional<ManifestColorConfig> color_config;  // [material] absent before 0.2
+  ManifestQuality quality;                          // [material]
+  ManifestTraining training;                        // [material]
   std::vector<ManifestLeftOut> left_out;
   std::vector<std::string> warnings;
 };
+
+// The version that is written for a manifest; see kManifestVersion.
+int FormatVersionOf(const Manifest& manifest);
 
 // The canonical text: fixed key order, 2-space indent, LF, a final newline, shortest decimals that
 // read back exactly. The same manifest gives the same bytes. Text that is not UTF-8 has its bad

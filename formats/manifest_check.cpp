@@ -162,8 +162,8 @@ Status CheckChannels(const Manifest& manifest) {
     const ManifestChannel& channel = manifest.channels[i];
     const Pointer at = "/channels/" + std::to_string(i);
     PATINA_TRY(NotEmpty(at + "/map", channel.map));
-    PATINA_TRY(OneOf(at + "/encoding", channel.encoding, {"linear", "srgb", "normal_xy"},
-                     ErrorCode::kUnsupported));
+    PATINA_TRY(OneOf(at + "/encoding", channel.encoding,
+                     {"linear", "srgb", "normal_xy", "signed_log"}, ErrorCode::kUnsupported));
     if (!seen.insert({channel.map, channel.component}).second) {
       return Bad(at, "the channel " + QuoteForMessage(channel.map + "." + channel.component) +
                          " is listed twice");
@@ -179,12 +179,20 @@ Status CheckChannels(const Manifest& manifest) {
                                         QuoteForMessage(channel.component));
     }
     if (!std::isfinite(channel.scale) || !(channel.scale > 0) ||
-        (channel.scale != 1.0f && channel.encoding != "linear")) {
-      return Bad(at + "/scale", "not a finite number above 0 of a \"linear\" channel");
+        (channel.scale != 1.0f && channel.encoding != "linear" &&
+         channel.encoding != "signed_log")) {
+      return Bad(at + "/scale",
+                 "not a finite number above 0 of a \"linear\" or \"signed_log\" channel");
     }
     if (!std::isfinite(channel.range_min) || !std::isfinite(channel.range_max) ||
         channel.range_min > channel.range_max) {
       return Bad(at + "/range", "not two finite numbers in rising order");
+    }
+    if (channel.encoding == "signed_log") {
+      // Powers of two beyond this are no floats.
+      constexpr double kMostLog = 256;
+      PATINA_TRY(InRange(at + "/range/0", channel.range_min, -kMostLog, kMostLog));
+      PATINA_TRY(InRange(at + "/range/1", channel.range_max, -kMostLog, kMostLog));
     }
     if (channel.output < 0) {
       if (!std::isfinite(channel.constant)) return Bad(at + "/constant", "not a finite number");
@@ -214,6 +222,12 @@ Status CheckMaps(const Manifest& manifest) {
       return Bad(at + "/role", QuoteForMessage(map.role) + " is listed twice");
     PATINA_TRY(CheckType(at + "/type", map.type));
     PATINA_TRY(OneOf(at + "/transfer", map.transfer, {"linear", "srgb"}));
+    if (!map.color_rule.empty()) {
+      PATINA_TRY(OneOf(at + "/color_rule", map.color_rule,
+                       {"list", "option", "name", "tag", "file_rule", "default"}));
+    }
+    if (map.color_space.empty() != map.color_rule.empty())
+      return Bad(at, "color_space and color_rule come together");
     if (map.file < -1 || map.file >= static_cast<int>(manifest.source.files.size())) {
       return Bad(at + "/file", std::to_string(map.file) + " is not an index into /source/files");
     }
@@ -381,8 +395,16 @@ Status CheckManifest(const Manifest& manifest) {
     return Bad("/seed", std::to_string(manifest.seed) + " is 2^63 or more");
   PATINA_TRY(NotEmpty("/quality_setting", manifest.quality_setting));
   PATINA_TRY(CheckPayloads(manifest));
-  PATINA_TRY(OneOf("/color/working_space", manifest.working_space, {"lin_rec709"},
+  PATINA_TRY(OneOf("/color/working_space", manifest.working_space, {"lin_rec709", "acescg"},
                    ErrorCode::kUnsupported));
+  if (manifest.color_config) {
+    const ManifestColorConfig& config = *manifest.color_config;
+    PATINA_TRY(OneOf("/color/config/source", config.source, {"builtin", "environment", "file"}));
+    PATINA_TRY(HexDigest("/color/config/sha256", config.sha256));
+    if (auto status = CheckPlainName(config.file, "/color/config/file:");
+        !status && config.source != "builtin")
+      return status;
+  }
   return manifest.kind == "brdf" ? CheckBrdf(manifest) : CheckMaterial(manifest);
 }
 

@@ -109,6 +109,7 @@ void ReadJob(Json job, const std::string& default_out, ParsedSubmit* parsed) {
   RefuseRelative(read->file, "/job/file", parsed);
   RefuseRelative(read->folder, "/job/folder", parsed);
   RefuseRelative(read->out, "/job/out", parsed);
+  RefuseRelative(read->ocio, "/job/ocio", parsed);
   if (read->folder.empty()) {
     for (size_t i = 0; i < read->maps.size(); ++i)
       RefuseRelative(read->maps[i].file, "/job/maps/" + std::to_string(i) + "/file", parsed);

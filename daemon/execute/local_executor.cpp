@@ -206,6 +206,7 @@ class LocalExecutor : public Executor {
     SandboxPaths paths;
     paths.read = SystemFiles();
     paths.read.insert(paths.read.end(), spec.inputs.begin(), spec.inputs.end());
+    paths.read.insert(paths.read.end(), options_.read.begin(), options_.read.end());
     paths.read.push_back(spec.fence);
     paths.execute = SystemPrograms();
     paths.execute.push_back(options_.worker);

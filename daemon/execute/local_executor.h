@@ -24,6 +24,7 @@ struct LocalExecutorOptions {
   int nice = 0;        // 0..19
   enum class Sandbox { kOff, kIfPossible, kRequired } sandbox = Sandbox::kIfPossible;
   std::vector<std::string> environment;  // of the child, complete: "NAME=value"
+  std::vector<std::string> read;         // files and folders that every child may read
 };
 
 // Errors: kUnsupported (a sandbox is required and the kernel has none), kResourceExhausted. The

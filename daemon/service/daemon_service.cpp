@@ -55,7 +55,8 @@ Status CheckLimit(const char* name, std::optional<int64_t> value) {
 std::string RecipeTag(const Job& job) {
   const int version = job.kind == JobKind::kBrdf ? kBrdfRecipeVersion : kRecipeVersion;
   return std::string(JobKindName(job.kind)) + " recipe " + std::to_string(version) + "\n" +
-         CanonicalJob(job) + "\n" + job.folder + "\n" + job.set + "\n" + job.file + "\n";
+         CanonicalJob(job) + "\n" + job.folder + "\n" + job.set + "\n" + job.file + "\n" +
+         (job.ocio.empty() ? "" : job.ocio + "\n");
 }
 
 std::string SourceOf(const Job& job) {

@@ -68,6 +68,7 @@ Status ConfineJob(const Roots& roots, Job* job) {
       file = job->folder + "/" + file;
     PATINA_TRY(Confine("/maps/" + std::to_string(i) + "/file", roots.input, "input_roots", &file));
   }
+  if (!job->ocio.empty()) PATINA_TRY(Confine("/ocio", roots.input, "input_roots", &job->ocio));
   job->maps_folder = job->folder;
   return {};
 }
@@ -76,6 +77,8 @@ std::vector<std::string> InputsOf(const Job& job, const Roots& roots) {
   std::vector<std::string> inputs;
   if (!job.file.empty()) inputs.push_back(job.file);
   for (const JobMap& map : job.maps) inputs.push_back(map.file);
+  // Its tables lie beside it or below.
+  if (!job.ocio.empty()) inputs.push_back(fs::path(job.ocio).parent_path().string());
   if (job.folder.empty()) return inputs;
   inputs.push_back(job.folder);
   constexpr int kMostLinks = 1000;

@@ -23,7 +23,8 @@ bool LiesWithin(const std::string& path, const std::vector<std::string>& folders
 // begins with the JSON pointer.
 Status ConfineJob(const Roots& roots, Job* job);
 
-// What a job reads: its folder or files, and the targets, within the roots, of links in its folder.
+// What a job reads: its folder or files, the folder of its colour configuration, and the targets,
+// within the roots, of links in its folder.
 std::vector<std::string> InputsOf(const Job& job, const Roots& roots);
 
 }  // namespace patina::daemon

@@ -376,8 +376,9 @@ class Decoder {
 
   // How a coded value relates to the physical one.
   enum class Encoding {
-    kLinear,   // the same
-    kSrgb,     // physical = linear Rec.709 of an sRGB-coded value
+    kLinear,     // physical = coded * scale
+    kSrgb,       // physical = linear value of an sRGB-coded one, of the working space
+    kSignedLog,  // physical = scale * sign(coded) * (2^|coded| - 1), of the working space
     kNormalXy  // physical = 2 * coded - 1: x or y of a unit normal in tangent space, OpenGL (Y up);
                // see NormalZ
   };
@@ -386,7 +387,7 @@ class Decoder {
     std::string map;        // "albedo", "normal", "roughness", ...
     std::string component;  // "r", "g", "b", "x", "y" or ""
     Encoding encoding = Encoding::kLinear;
-    float scale = 1;  // kLinear: physical = coded * scale
+    float scale = 1;  // of kLinear and kSignedLog
     float min = 0;    // coded values are clamped to [min, max]
     float max = 1;
     int output = -1;     // of the network, or -1: constant
@@ -424,6 +425,8 @@ class Decoder {
   int levels() const { return levels_; }  // of the chain down to 1x1
   int outputs() const { return outputs_; }
   bool wraps() const { return wrap_; }
+  // Primaries of physical colours: "lin_rec709" or "acescg".
+  const std::string& working_space() const { return working_space_; }
   const std::vector<Channel>& channels() const { return channels_; }
   int MipWidth(int level) const { return decoder_detail::LevelSide(width_, level); }
   int MipHeight(int level) const { return decoder_detail::LevelSide(height_, level); }
@@ -454,6 +457,8 @@ class Decoder {
         return coded <= 0.04045f ? coded / 12.92f : std::pow((coded + 0.055f) / 1.055f, 2.4f);
       case Encoding::kNormalXy:
         return 2.0f * coded - 1.0f;
+      case Encoding::kSignedLog:
+        return std::copysign(channel.scale * (std::exp2(std::fabs(coded)) - 1.0f), coded);
       case Encoding::kLinear:
         break;
     }
@@ -735,7 +740,7 @@ class Decoder {
       return corrupt("/format is not \"patina-container\"");
     const int version = Integer(Member(manifest, "format_version"), 1, INT32_MAX);
     if (version < 1) return corrupt("/format_version is not a positive integer");
-    if (version > 1) return unsupported("/format_version is newer than this decoder");
+    if (version > 2) return unsupported("/format_version is newer than this decoder");
     if (Text(Member(manifest, "kind")) != "material")
       return unsupported("/kind is not \"material\"");
     const nlohmann::json& source = Member(manifest, "source");
@@ -748,6 +753,9 @@ class Decoder {
     if (address != "wrap" && address != "clamp")
       return unsupported("/source/address is neither wrap nor clamp");
     wrap_ = address == "wrap";
+    working_space_ = Text(Member(Member(manifest, "color"), "working_space"));
+    if (working_space_ != "lin_rec709" && working_space_ != "acescg")
+      return unsupported("/color/working_space is neither lin_rec709 nor acescg");
 
     *features = &Member(manifest, "features");
     if (!(*features)->is_array() || (*features)->size() > static_cast<size_t>(kMaxTextures)) {
@@ -785,12 +793,14 @@ class Decoder {
       channel.map = Text(Member(entry, "map"));
       channel.component = Text(Member(entry, "component"));
       const std::string encoding = Text(Member(entry, "encoding"));
-      if (encoding != "linear" && encoding != "srgb" && encoding != "normal_xy") {
+      if (encoding != "linear" && encoding != "srgb" && encoding != "normal_xy" &&
+          encoding != "signed_log") {
         return failure->Set(LoadStatus::kUnsupported, place + "/encoding is not known");
       }
-      channel.encoding = encoding == "srgb"        ? Encoding::kSrgb
-                         : encoding == "normal_xy" ? Encoding::kNormalXy
-                                                   : Encoding::kLinear;
+      channel.encoding = encoding == "srgb"         ? Encoding::kSrgb
+                         : encoding == "normal_xy"  ? Encoding::kNormalXy
+                         : encoding == "signed_log" ? Encoding::kSignedLog
+                                                    : Encoding::kLinear;
       const nlohmann::json& scale = Member(entry, "scale");
       if (!scale.is_null()) channel.scale = Real(scale);
       if (!(channel.scale > 0))
@@ -955,6 +965,7 @@ class Decoder {
   int width_ = 0;
   int height_ = 0;
   int levels_ = 0;
+  std::string working_space_ = "lin_rec709";
   bool wrap_ = true;
   int inputs_ = 0;
   int hidden_ = 0;

@@ -41,6 +41,9 @@ std::string MapOptions(const JobOverrides& given) {
   add(given.time_budget_s.has_value(), "--time-budget");
   add(given.samples.has_value(), "--samples");
   add(given.min_psnr_db.has_value(), "--min-psnr");
+  add(given.working_space.has_value(), "--working-space");
+  add(given.color_space.has_value(), "--color-space");
+  add(given.ocio.has_value(), "--ocio");
   add(given.repair_nonfinite, "--repair-nonfinite");
   add(given.no_toksvig, "--no-toksvig");
   return names;
@@ -68,6 +71,9 @@ void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.time_budget_s, &job->time_budget_s);
   Override(overrides.samples, &job->samples);
   Override(overrides.min_psnr_db, &job->min_psnr_db);
+  Override(overrides.working_space, ParseWorkingSpace, &job->working_space);
+  Override(overrides.color_space, &job->color_space);
+  Override(overrides.ocio, &job->ocio);
   if (overrides.repair_nonfinite) job->repair_nonfinite = true;
   if (overrides.no_toksvig) job->toksvig = false;
 }

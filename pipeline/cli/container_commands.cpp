@@ -26,12 +26,17 @@ int FailCommand(const Error& error) {
 }
 
 int UnpackCommand(const CommandLine& line, const CancelToken& cancel) {
-  const UnpackOptions& options = line.unpack;
+  const UnpackArguments& given = line.unpack;
   ThreadPool pool(line.threads);
   SetImageIoThreads(pool.threads());
-  auto unpacked = UnpackContainer(options.container, options.out, options.mip,
-                                  options.format == "exr" ? UnpackFormat::kExr : UnpackFormat::kPng,
-                                  pool, cancel);
+  UnpackOptions options;
+  options.mip = given.mip;
+  options.format = given.format == "exr"   ? UnpackFormat::kExr
+                   : given.format == "png" ? UnpackFormat::kPng
+                                           : UnpackFormat::kAuto;
+  options.space = given.space;
+  options.ocio = given.ocio;
+  auto unpacked = UnpackContainer(given.container, given.out, options, pool, cancel);
   if (!unpacked) return FailCommand(unpacked.error());
   for (const std::string& warning : unpacked->warnings)
     std::fprintf(stderr, "patina: warning: %s\n", warning.c_str());
@@ -72,6 +77,8 @@ int CompareCommand(const CommandLine& line, const CancelToken& cancel) {
     source.maps = std::move(*maps);
     source.maps_folder = FolderOfFile(options.map_list);
   }
+  if (!options.color_space.empty()) source.color_space = options.color_space;
+  if (!options.ocio.empty()) source.ocio = options.ocio;
   source.repair_nonfinite = source.repair_nonfinite || options.repair_nonfinite;
   ThreadPool pool(line.threads);
   TerminalProgress progress(stderr, line.verbosity, source.asset);

@@ -50,6 +50,14 @@ constexpr const char* kBakeFooter =
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
     "  patina bake wall --out baked --target-psnr 34 --time-budget 60 --min-psnr 30\n"
     "\n"
+    "The colour space of a colour map is what the map list says; else --color-space; else a word "
+    "of "
+    "the file's name\n"
+    "(linear, srgb, raw); else what the file says (ICC profile, PNG chunks, EXR chromaticities); "
+    "else a file rule of the\n"
+    "configuration; else sRGB for integers, linear Rec.709 for floats. Data maps are never "
+    "converted.\n"
+    "\n"
     "A map list (--maps) is a JSON array with files relative to its own folder, such as\n"
     "  [{\"role\": \"albedo\", \"file\": \"wall_c.png\"},\n"
     "   {\"role\": \"roughness\", \"file\": \"wall_gloss.png\", \"channels\": \"r\", \"invert\": "
@@ -153,6 +161,16 @@ void AddBake(CLI::App* app, CommandLine* line) {
   AddOverride(command, "--address", &o.job.address,
               "[maps] What lies beyond the edge (default wrap, for tiling maps)")
       ->check(CLI::IsMember({"wrap", "clamp"}));
+  AddOverride(command, "--working-space", &o.job.working_space,
+              "[maps] Primaries of the container's physical colours (default lin_rec709)")
+      ->check(CLI::IsMember({"lin_rec709", "acescg"}));
+  AddOverride(command, "--color-space", &o.job.color_space,
+              "[maps] Colour space of the colour maps: srgb, linear, raw, or a name of the "
+              "configuration (default auto)")
+      ->type_name("NAME");
+  AddOverride(command, "--ocio", &o.job.ocio,
+              "[maps] OpenColorIO configuration (default: $OCIO, else a built-in one)")
+      ->type_name("FILE");
   command->add_flag(
       "--repair-nonfinite", o.job.repair_nonfinite,
       "[maps] Replace NaN and infinite texels by their neighbours instead of refusing the file");
@@ -204,7 +222,7 @@ void AddRun(CLI::App* app, CommandLine* line) {
 void AddUnpack(CLI::App* app, CommandLine* line) {
   CLI::App* command =
       app->add_subcommand("unpack", "Write the maps of a material's container as images");
-  UnpackOptions& o = line->unpack;
+  UnpackArguments& o = line->unpack;
   command
       ->add_option("CONTAINER", o.container,
                    "A container, or the folder of an asset (its current container)")
@@ -215,8 +233,19 @@ void AddUnpack(CLI::App* app, CommandLine* line) {
       ->type_name("N");
   command
       ->add_option("--format", o.format,
-                   "png (default; 8 or 16 bit as the source) or exr (floats, linear colour)")
+                   "png (default; 8 or 16 bit as the source) or exr (floats, linear colour); with "
+                   "--space the default is what holds the colours")
       ->check(CLI::IsMember({"png", "exr"}));
+  CLI::Option* space = command
+                           ->add_option("--space", o.space,
+                                        "Write colour maps in this colour space (default: sRGB in "
+                                        "png, linear Rec.709 in exr)")
+                           ->type_name("NAME");
+  command
+      ->add_option("--ocio", o.ocio,
+                   "OpenColorIO configuration that has it (default: $OCIO, else a built-in one)")
+      ->type_name("FILE")
+      ->needs(space);
   command->add_option("--threads", line->threads, "Threads (default: all CPUs)")
       ->check(CLI::Range(0, kMaxThreads));
   AddCommon(command, line, false);
@@ -224,7 +253,8 @@ void AddUnpack(CLI::App* app, CommandLine* line) {
       "Files are named by role: albedo, normal (OpenGL), ao, roughness, metalness, displacement, "
       "emissive, opacity ...\n"
       "Example:\n"
-      "  patina unpack baked/wall --out maps --format png");
+      "  patina unpack baked/wall --out maps --format png\n"
+      "  patina unpack baked/wall --out maps --space ACEScg");
   command->callback([line] { line->command = Command::kUnpack; });
 }
 
@@ -252,6 +282,11 @@ void AddCompare(CLI::App* app, CommandLine* line) {
       ->add_option("--maps", o.map_list,
                    "List of the maps of SOURCE, in place of finding them by name")
       ->type_name("FILE.json");
+  command
+      ->add_option("--color-space", o.color_space, "Colour space of the colour maps, as of `bake`")
+      ->type_name("NAME");
+  command->add_option("--ocio", o.ocio, "OpenColorIO configuration, as of `bake`")
+      ->type_name("FILE");
   command->add_flag("--repair-nonfinite", o.repair_nonfinite,
                     "Replace NaN and infinite texels of the source");
   command->add_option("--threads", line->threads, "Threads (default: all CPUs)")
@@ -387,6 +422,15 @@ void AddSubmit(CLI::App* app, CommandLine* line) {
       ->add_option("--key", o.idempotency_key,
                    "A name for this request: sent again, it makes no second job")
       ->type_name("KEY");
+  command->add_option("--working-space", o.working_space, "[maps] As of `patina bake`")
+      ->check(CLI::IsMember({"lin_rec709", "acescg"}));
+  command->add_option("--color-space", o.color_space, "[maps] As of `patina bake`")
+      ->type_name("NAME");
+  command
+      ->add_option("--ocio", o.ocio,
+                   "[maps] OpenColorIO configuration, within the daemon's input folders (default: "
+                   "the daemon's $OCIO, not yours)")
+      ->type_name("FILE");
   command->footer(
       "Prints a line `ID ASSET` for each job. With --wait the exit code is that of the worst job, "
       "as of `patina bake`;\n"

@@ -27,6 +27,9 @@ struct JobOverrides {
   std::optional<double> time_budget_s;
   std::optional<double> samples;
   std::optional<double> min_psnr_db;
+  std::optional<std::string> working_space;
+  std::optional<std::string> color_space;
+  std::optional<std::string> ocio;
   bool repair_nonfinite = false;
   bool no_toksvig = false;
 };
@@ -45,11 +48,13 @@ struct RunOptions {
   std::string result;  // empty: result.json beside the events, or beside the job
 };
 
-struct UnpackOptions {
+struct UnpackArguments {
   std::string container;
   std::string out;
   int mip = 0;
-  std::string format = "png";  // "png" or "exr"
+  std::string format;  // "png" or "exr"; empty: by what is written
+  std::string space;   // of colour maps; empty: sRGB or linear Rec.709
+  std::string ocio;    // empty: $OCIO, else the built-in one
 };
 
 struct InfoOptions {
@@ -58,8 +63,9 @@ struct InfoOptions {
 
 struct CompareOptions {
   std::string container;
-  std::string source;    // a folder of maps, or a job file
-  std::string map_list;  // --maps FILE.json, or empty
+  std::string source;             // a folder of maps, or a job file
+  std::string map_list;           // --maps FILE.json, or empty
+  std::string color_space, ocio;  // as of `bake`; empty: the job's
   bool repair_nonfinite = false;
 };
 
@@ -106,7 +112,7 @@ struct CommandLine {
   Command command = Command::kBake;
   BakeOptions bake;
   RunOptions run;
-  UnpackOptions unpack;
+  UnpackArguments unpack;
   InfoOptions info;
   CompareOptions compare;
   EvalOptions eval;

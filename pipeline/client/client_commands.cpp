@@ -273,7 +273,8 @@ int SubmitCommand(const ClientOptions& options, const CancelToken& cancel) {
   std::vector<PlannedSubmit> plan;
   for (const std::string& input : options.inputs) {
     std::vector<PlannedSubmit> more =
-        PlanSubmit(input, {options.out, options.priority, options.force});
+        PlanSubmit(input, {options.out, options.priority, options.force, options.working_space,
+                           options.color_space, options.ocio});
     std::move(more.begin(), more.end(), std::back_inserter(plan));
   }
   if (!options.idempotency_key.empty() && plan.size() != 1) {

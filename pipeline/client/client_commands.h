@@ -17,17 +17,18 @@ struct ClientOptions {
   std::string socket;  // empty: see DefaultSocketPath
   bool json = false;
   bool quiet = false;
-  std::vector<int64_t> ids;         // cancel, retry; watch: at most one; logs: one
-  std::vector<std::string> inputs;  // submit: job files, folders, BRDF files
-  bool wait = false;                // submit
-  bool force = false;               // submit
-  int priority = 0;                 // submit
-  std::string out;                  // submit; empty: the job's, else the daemon's
-  std::string idempotency_key;      // submit; of one input
-  std::string state, asset;         // jobs: only these; empty: all
-  int limit = 20;                   // jobs
-  bool follow = false;              // logs
-  int64_t tail_bytes = 0;           // logs: only the last ones; 0: all
+  std::vector<int64_t> ids;                      // cancel, retry; watch: at most one; logs: one
+  std::vector<std::string> inputs;               // submit: job files, folders, BRDF files
+  bool wait = false;                             // submit
+  bool force = false;                            // submit
+  int priority = 0;                              // submit
+  std::string out;                               // submit; empty: the job's, else the daemon's
+  std::string working_space, color_space, ocio;  // submit; empty: the job's
+  std::string idempotency_key;                   // submit; of one input
+  std::string state, asset;                      // jobs: only these; empty: all
+  int limit = 20;                                // jobs
+  bool follow = false;                           // logs
+  int64_t tail_bytes = 0;                        // logs: only the last ones; 0: all
 };
 
 // $PATINA_SOCKET; else patinad.sock in the state folder that patinad takes by default:

@@ -26,6 +26,12 @@ PlannedSubmit Plan(Job job, const SubmitSettings& settings) {
     for (JobMap& map : job.maps)
       map.file = Absolute((fs::path(job.maps_folder) / map.file).string());
   }
+  if (job.kind == JobKind::kMaterial) {
+    if (auto space = ParseWorkingSpace(settings.working_space)) job.working_space = *space;
+    if (!settings.color_space.empty()) job.color_space = settings.color_space;
+    if (!settings.ocio.empty()) job.ocio = settings.ocio;
+    job.ocio = Absolute(job.ocio);
+  }
   job.file = Absolute(job.file);
   job.folder = Absolute(job.folder);
   job.out = Absolute(settings.out.empty() ? job.out : settings.out);

@@ -20,6 +20,8 @@ struct SubmitSettings {
   std::string out;  // empty: the job's, else the daemon's
   int priority = 0;
   bool force = false;
+  // Of texture sets; empty: the job's.
+  std::string working_space, color_space, ocio;
 };
 
 // input: a job file, a BRDF file, a folder of maps, or a folder of such. Paths are made absolute:

@@ -10,6 +10,11 @@ namespace {
 constexpr double kLinearKnee = 0.0031308;
 constexpr double kCodedKnee = 0.04045;
 
+constexpr double kRec709Gain = 1.09929682680944;
+constexpr double kRec709Knee = 0.018053968510807;
+constexpr double kRec709Slope = 4.5;
+constexpr double kRec709Power = 0.45;
+
 // Decoding is smooth: a uniform table with linear interpolation errs by h^2/8 max f'' = 2.2e-8 at
 // 4096 cells.
 struct DecodeTable {
@@ -101,6 +106,23 @@ double LinearToSrgb(double linear) {
   return std::copysign(coded, linear);
 }
 
+double Rec709ToLinear(double coded) {
+  const double magnitude = std::fabs(coded);
+  const double linear =
+      magnitude < kRec709Slope * kRec709Knee
+          ? magnitude / kRec709Slope
+          : std::pow((magnitude + (kRec709Gain - 1)) / kRec709Gain, 1 / kRec709Power);
+  return std::copysign(linear, coded);
+}
+
+double LinearToRec709(double linear) {
+  const double magnitude = std::fabs(linear);
+  const double coded = magnitude < kRec709Knee
+                           ? magnitude * kRec709Slope
+                           : kRec709Gain * std::pow(magnitude, kRec709Power) - (kRec709Gain - 1);
+  return std::copysign(coded, linear);
+}
+
 float Srgb8ToLinear(uint8_t code) { return kDecode8.value[code]; }
 
 void SrgbToLinearRow(const float* in, size_t count, float* out) {
@@ -109,6 +131,18 @@ void SrgbToLinearRow(const float* in, size_t count, float* out) {
 
 void LinearToSrgbRow(const float* in, size_t count, float* out) {
   for (size_t i = 0; i < count; ++i) out[i] = EncodeOne(in[i]);
+}
+
+void SignedLogRow(const float* in, size_t count, float scale, float* out) {
+  for (size_t i = 0; i < count; ++i) {
+    const double x = static_cast<double>(in[i]);
+    out[i] = static_cast<float>(
+        std::copysign(std::log2(1 + std::fabs(x) / static_cast<double>(scale)), x));
+  }
+}
+
+double SignedLogToLinear(double coded, double scale) {
+  return std::copysign(scale * (std::exp2(std::fabs(coded)) - 1), coded);
 }
 
 }  // namespace patina

@@ -10,6 +10,7 @@
 
 #include "pipeline/base/aligned_buffer.h"
 #include "pipeline/base/thread_pool.h"
+#include "pipeline/color/color_tag.h"
 
 namespace patina {
 
@@ -30,9 +31,8 @@ struct ImageInfo {
   int alpha_channel = -1;   // index of the alpha channel if it is among the loaded ones, or -1
   SampleType type = SampleType::kUint8;
   std::string format;  // "png", "jpeg", "targa", "tiff", "openexr", "hdr", "dds"
-  // Colour space or ICC profile that the file names; empty if none. Not acted on.
-  std::string color_hint;
-  int subimages = 1;  // parts of the file; the first one is read
+  ColorTag color_tag;  // what the file itself says about its colours
+  int subimages = 1;   // parts of the file; the first one is read
   uint64_t file_bytes = 0;
   std::vector<std::string> warnings;  // complete sentences without the file's name
 

@@ -19,6 +19,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/half.h"
+#include "pipeline/image/file_tags.h"
 
 namespace patina {
 namespace {
@@ -205,10 +206,27 @@ Status CheckSize(const std::string& path, const OIIO::ImageSpec& spec, const Sou
   return {};
 }
 
-std::string ColorHint(const OIIO::ImageSpec& spec) {
-  std::string hint = spec.get_string_attribute("ICCProfile:profile_description");
-  if (hint.empty()) hint = spec.get_string_attribute("oiio:ColorSpace");
-  return OneLine(hint);
+// The library's own "oiio:ColorSpace" does not count: its readers make one up where a file is
+// silent.
+ColorTag TagOf(const std::string& path, const std::string& format, const OIIO::ImageSpec& spec) {
+  ColorTag tag;
+  const OIIO::ParamValue* icc = spec.find_attribute("ICCProfile");
+  if (icc != nullptr && icc->type().basetype == OIIO::TypeDesc::UINT8) {
+    tag = TagFromIccProfile({static_cast<const uint8_t*>(icc->data()), icc->type().size()});
+    if (!tag.empty()) return tag;
+  }
+  ColorTag other;
+  if (format == "png") other = TagFromPngChunks(path);
+  if (format == "openexr") {
+    const OIIO::ParamValue* found = spec.find_attribute("chromaticities");
+    if (found != nullptr && found->type().basetype == OIIO::TypeDesc::FLOAT &&
+        found->type().basevalues() == 8) {
+      other = TagFromChromaticities(
+          std::span<const float, 8>(static_cast<const float*>(found->data()), 8));
+    }
+  }
+  if (other.problem.empty()) other.problem = tag.problem;
+  return other;
 }
 
 // Opens the first part and leaves it selected.
@@ -242,7 +260,7 @@ Result<OpenImage> Open(const std::string& path) {
   info.width = spec.width;
   info.height = spec.height;
   info.channels = spec.nchannels;
-  info.color_hint = ColorHint(spec);
+  info.color_tag = TagOf(path, file.format, spec);
   for (int c = 0; c < std::min(spec.nchannels, kMaxLoadedChannels); ++c) {
     SampleType type;
     if (!SampleTypeOf(spec.channelformat(c), &type)) {
@@ -325,7 +343,8 @@ Status WriteRows(OIIO::ImageOutput* output, const OIIO::TypeDesc& type, int heig
 }
 
 Status WriteOpened(OIIO::ImageOutput* output, const std::string& path, WriteFormat format,
-                   int width, int height, int channels, const float* values) {
+                   int width, int height, int channels, const float* values,
+                   const Primaries* primaries) {
   OIIO::TypeDesc type;
   switch (format) {
     case WriteFormat::kPng8:
@@ -349,6 +368,16 @@ Status WriteOpened(OIIO::ImageOutput* output, const std::string& path, WriteForm
   spec.attribute("DateTime", "2000:01:01 00:00:00");
   spec.attribute("Software", "patina");
   spec.attribute("oiio:UnassociatedAlpha", 1);
+  if (primaries != nullptr) {
+    std::array<float, 8> xy{};
+    size_t i = 0;
+    for (const Chromaticity& c :
+         {primaries->red, primaries->green, primaries->blue, primaries->white}) {
+      xy[i++] = static_cast<float>(c.x);
+      xy[i++] = static_cast<float>(c.y);
+    }
+    spec.attribute("chromaticities", OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, 8), xy.data());
+  }
   if (!output->open(path, spec)) {
     return Fail(ErrorCode::kIo, path + ": cannot create the image (" + OneLine(output->geterror()) +
                                     "); check the folder, space and permissions");
@@ -423,7 +452,7 @@ Result<Image> ReadImage(const std::string& path) {
 }
 
 Status WriteImage(const std::string& path, WriteFormat format, int width, int height, int channels,
-                  const float* values) {
+                  const float* values, const Primaries* primaries) {
   if (width < 1 || height < 1 || width > kMaxImageSide || height > kMaxImageSide || channels < 1 ||
       channels > 4) {
     return Fail(ErrorCode::kInvalidArgument,
@@ -437,7 +466,8 @@ Status WriteImage(const std::string& path, WriteFormat format, int width, int he
       return Fail(ErrorCode::kUnsupported, path + ": the image library cannot write this format (" +
                                                OneLine(OIIO::geterror()) + ")");
     }
-    Status status = WriteOpened(output.get(), path, format, width, height, channels, values);
+    Status status =
+        WriteOpened(output.get(), path, format, width, height, channels, values, primaries);
     output.reset();
     if (status && png && !EndsAsPng(path)) {
       status = Fail(ErrorCode::kIo,

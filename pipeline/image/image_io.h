@@ -37,9 +37,10 @@ enum class WriteFormat { kPng8, kPng16, kExrHalf, kExrFloat };
 // Writes rows from the top of interleaved values: [height][width][channels], 1 to 4 channels (grey,
 // grey + alpha, RGB, RGBA; alpha unassociated). PNG clamps to [0, 1] and rounds to nearest; NaN
 // becomes 0. Values are written as they are: no colour conversion, no dithering. The same input
-// gives the same bytes (no time stamps). Errors: kInvalidArgument (sizes), kIo (with the path; what
+// gives the same bytes (no time stamps). `primaries`: null, or of the values, to be named in an EXR
+// file. Errors: kInvalidArgument (sizes), kIo (with the path; what
 // was written is removed), kResourceExhausted.
 Status WriteImage(const std::string& path, WriteFormat format, int width, int height, int channels,
-                  const float* values);
+                  const float* values, const Primaries* primaries = nullptr);
 
 }  // namespace patina

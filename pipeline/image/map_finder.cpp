@@ -271,6 +271,7 @@ Result<MapSet> ResolveMaps(const std::vector<MapRequest>& requests, const std::s
     source.file = request.file;
     source.path = (fs::path(base_folder) / request.file).string();
     source.color_space = request.color_space;
+    source.list_index = static_cast<int>(i);
     source.convention = request.convention;
     source.convention_from_name = false;
     if (request.file.empty()) return Fail(ErrorCode::kInvalidArgument, where + ": no file named");

@@ -17,7 +17,10 @@ struct MapSource {
   std::string file;
   // Letters of r, g, b, a: the file's first to fourth channel; "" lets the content decide.
   std::string channels;
-  ColorSpace color_space = ColorSpace::kAuto;
+  // What the numbers of the file are: "auto" (nobody says), "srgb", "linear", "raw", or the name of
+  // a space of a configuration. See ChooseColor in pipeline/material/color_choice.h.
+  std::string color_space = "auto";
+  int list_index = -1;  // in the list of maps it comes from; -1: found by name
   NormalConvention convention = NormalConvention::kAuto;
   bool convention_from_name = true;  // false: somebody gave it, and it is not to be overridden
   bool invert = false;               // the file holds 1 - value
@@ -60,7 +63,7 @@ struct MapRequest {
   std::string file;  // absolute, or relative to the base folder
   // "" or letters of "rgba": three for a colour, two or three for a normal, one for a scalar.
   std::string channels;
-  ColorSpace color_space = ColorSpace::kAuto;
+  std::string color_space = "auto";  // as MapSource::color_space
   NormalConvention convention = NormalConvention::kAuto;
   bool invert = false;
 };

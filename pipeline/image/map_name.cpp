@@ -104,11 +104,11 @@ bool TakeQualifier(const std::string& word, MapName* name) {
   } else if (HasNumberAfter(word, "var")) {
     name->variant = SmallNumber(std::string_view(word).substr(3));
   } else if (word == "srgb") {
-    name->color_space = ColorSpace::kSrgb;
+    name->color_space = "srgb";
   } else if (word == "linear" || word == "lin") {
-    name->color_space = ColorSpace::kLinear;
+    name->color_space = "linear";
   } else if (word == "raw" || word == "noncolor") {
-    name->color_space = ColorSpace::kRaw;
+    name->color_space = "raw";
   } else {
     return false;
   }

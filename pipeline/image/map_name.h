@@ -13,7 +13,7 @@ struct MapName {
   // What the map is; nullptr if no word at the end of the name says so.
   const MapToken* token = nullptr;
   NormalConvention convention = NormalConvention::kAuto;
-  ColorSpace color_space = ColorSpace::kAuto;  // from words like "srgb", "linear"
+  std::string color_space = "auto";  // from words like "srgb", "linear"
   // Lower case; what comes before the token, without resolutions and levels.
   std::vector<std::string> stem_words;
   std::string stem;  // the same as written in the name

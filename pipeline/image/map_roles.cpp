@@ -245,28 +245,6 @@ std::optional<NormalConvention> ParseNormalConvention(std::string_view name) {
   return std::nullopt;
 }
 
-const char* ColorSpaceName(ColorSpace space) {
-  switch (space) {
-    case ColorSpace::kAuto:
-      return "auto";
-    case ColorSpace::kSrgb:
-      return "srgb";
-    case ColorSpace::kLinear:
-      return "linear";
-    case ColorSpace::kRaw:
-      return "raw";
-  }
-  return "auto";
-}
-
-std::optional<ColorSpace> ParseColorSpace(std::string_view name) {
-  if (name == "auto") return ColorSpace::kAuto;
-  if (name == "srgb") return ColorSpace::kSrgb;
-  if (name == "linear") return ColorSpace::kLinear;
-  if (name == "raw") return ColorSpace::kRaw;
-  return std::nullopt;
-}
-
 const std::vector<MapRole>& MapRoles() {
   static const std::vector<MapRole> roles = {
       {"albedo", MapKind::kColor, 'r'},

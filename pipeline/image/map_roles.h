@@ -21,11 +21,6 @@ enum class NormalConvention { kAuto, kOpenGl, kDirectX };
 const char* NormalConventionName(NormalConvention convention);  // "auto", "opengl", "directx"
 std::optional<NormalConvention> ParseNormalConvention(std::string_view name);
 
-// What the numbers of a file mean. kAuto: sRGB for colour in 8- or 16-bit integers, else linear.
-enum class ColorSpace { kAuto, kSrgb, kLinear, kRaw };
-const char* ColorSpaceName(ColorSpace space);  // "auto", "srgb", "linear", "raw"
-std::optional<ColorSpace> ParseColorSpace(std::string_view name);
-
 struct MapRole {
   const char* name;  // reaches manifests: never renamed
   MapKind kind;

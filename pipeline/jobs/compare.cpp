@@ -37,8 +37,21 @@ Result<Comparison> CompareContainer(const std::string& container, const Job& sou
   Job job = source;
   job.address =
       opened.manifest.source.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
+  job.working_space =
+      ParseWorkingSpace(opened.manifest.working_space).value_or(WorkingSpace::kLinearRec709);
   PATINA_ASSIGN(const MapSet set, MapsOfJob(job));
   PATINA_ASSIGN(const JobSource read, ReadSource(job, set, pool, cancel, progress));
+  for (const ReferenceMap& map : read.reference.maps) {
+    for (const ManifestMap& baked : opened.manifest.maps) {
+      if (baked.role != map.role || baked.color_space.empty() ||
+          baked.color_space == map.color_space)
+        continue;
+      return Fail(ErrorCode::kConflict,
+                  opened.directory + ": its " + map.role + " was read as \"" + baked.color_space +
+                      "\", now it would be as \"" + map.color_space +
+                      "\"; give the --color-space and the --ocio of the bake");
+    }
+  }
   Comparison comparison;
   comparison.asset = opened.manifest.asset;
   comparison.directory = opened.directory;

@@ -19,7 +19,8 @@ struct Comparison {
 };
 
 // `source` says where the maps are: folder, set or maps of a job; its other fields are not used but
-// for repair_nonfinite, toksvig and normal_convention. Addressing is the container's. Errors: those
+// for repair_nonfinite, toksvig, normal_convention, color_space and ocio. Addressing and working
+// space are the container's. Errors: kConflict if a colour is not read as it was; those
 // of OpenContainer, VerifyPayloads, MapsOfJob, ReadSource and MeasureContainer; kUnsupported for a
 // BRDF.
 Result<Comparison> CompareContainer(const std::string& container, const Job& source,

@@ -112,6 +112,18 @@ std::string ContainerText(const Container& container) {
   }
   text += "\nMaps\n";
   for (const ManifestMapQuality& map : m.quality.maps) text += MapLine(m, map);
+  text += "\nColour\n  working space " + m.working_space;
+  if (m.color_config) {
+    text += ", configuration " +
+            (m.color_config->file.empty() ? "built in" : m.color_config->file) + " (" +
+            (m.color_config->source == "environment" ? "of $OCIO, " : "") + "sha256 " + m.color_config->sha256.substr(0, 12) + "...)";
+  }
+  text += "\n";
+  for (const ManifestMap& map : m.maps) {
+    if (!map.color_space.empty())
+      text +=
+          Format("  %-18s", map.role.c_str()) + map.color_space + " (by " + map.color_rule + ")\n";
+  }
   text += "\nFiles\n";
   for (const ManifestPayload& payload : m.payloads) {
     text += Format("  %-18s%12llu bytes  %s", payload.name.c_str(),

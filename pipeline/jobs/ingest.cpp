@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "formats/base/names.h"
 #include "formats/base/sha256.h"
 
 namespace patina {
@@ -31,6 +32,9 @@ Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool
   options.repair_nonfinite = job.repair_nonfinite;
   options.widen_roughness = job.toksvig;
   options.cancel = &cancel;
+  auto config = ColorConfig::Load(job.ocio);
+  if (!config) return Fail(std::move(config).error(), "/ocio");
+  options.color = {job.working_space, *config, job.color_space};
 
   // Hashed before and after reading: a file that is still being copied must not get a container
   // under a wrong name.
@@ -38,6 +42,7 @@ Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool
   for (const MapSource& map : set.maps) paths.push_back(map.path);
   PATINA_ASSIGN(const auto before, HashFiles(paths, cancel));
   JobSource source;
+  source.color_config = *config;
   PATINA_ASSIGN(source.reference, BuildReference(set, options, pool, progress));
   PATINA_ASSIGN(const auto after, HashFiles(paths, cancel));
   for (const auto& [path, hash] : after) {
@@ -53,13 +58,14 @@ Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool
     }
     source.sha256.push_back(found->second);
   }
-  source.fingerprint = FingerprintOf(job, source.reference, source.sha256);
+  source.fingerprint = FingerprintOf(job, source.reference, source.color_config, source.sha256);
   return source;
 }
 
 std::string FingerprintOf(const Job& job, const SourceReference& reference,
-                          const std::vector<std::string>& sha256) {
+                          const ColorConfig& color_config, const std::vector<std::string>& sha256) {
   Sha256 hash;
+  bool converted = false;
   hash.Update("patina material\nrecipe " + std::to_string(kRecipeVersion) + "\njob " +
               CanonicalJob(job) + "\n");
   for (const ReferenceMap& map : reference.maps) {
@@ -68,9 +74,16 @@ std::string FingerprintOf(const Job& job, const SourceReference& reference,
     for (const int channel : map.file_channels) line += " " + std::to_string(channel);
     line += map.inverted ? " inverted" : "";
     line += map.srgb ? " srgb" : " linear";
-    line += std::string(" ") + NormalConventionName(map.convention) + "\n";
-    hash.Update(line);
+    line += std::string(" ") + NormalConventionName(map.convention);
+    // Nothing is said of what was always so: containers of earlier versions keep their
+    // fingerprints.
+    if (map.converted) line += " from " + QuoteForMessage(map.color_space);
+    if (map.encoding == Encoding::kSignedLog) line += " signed_log";
+    hash.Update(line + "\n");
+    converted = converted || map.converted;
   }
+  if (converted || color_config.source() != ConfigSource::kBuiltin)
+    hash.Update("colors " + color_config.sha256() + "\n");
   return hash.FinishHex();
 }
 

@@ -15,18 +15,21 @@ namespace patina {
 struct JobSource {
   SourceReference reference;
   std::vector<std::string> sha256;  // of reference.files, in their order
-  std::string fingerprint;          // see FingerprintOf
+  ColorConfig color_config = ColorConfig::Builtin();
+  std::string fingerprint;  // see FingerprintOf
 };
 
 // Reads the maps of a set as the job wants them.
-// Errors: those of BuildReference; kConflict when a file changed while it was read.
+// Errors: those of BuildReference and, led by "/ocio", of ColorConfig::Load; kConflict when a file
+// changed while it was read.
 Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool,
                              const CancelToken& cancel, ProgressSink& progress);
 
 // SHA-256 of what decides the bytes of the container: recipe version, canonical job, and for each
-// map its role, the hash of its file and how it is read. Not: where the files lie, what they are
-// called, and when they were written.
+// map its role, the hash of its file and how it is read, its colour space included; the hash of the
+// configuration of colours, if it is not the built-in one or has converted something. Not: where
+// the files lie, what they are called, and when they were written.
 std::string FingerprintOf(const Job& job, const SourceReference& reference,
-                          const std::vector<std::string>& sha256);
+                          const ColorConfig& color_config, const std::vector<std::string>& sha256);
 
 }  // namespace patina

@@ -178,7 +178,7 @@ std::vector<JobMap> ReadMaps(const Json& list, const std::string& pointer,
         map.channels = text;
       }
     }
-    reader.Choice("color_space", {"auto", "srgb", "linear", "raw"}, &map.color_space);
+    reader.Text("color_space", false, kMaxColorSpaceName, &map.color_space);
     reader.Choice("convention", {"auto", "opengl", "directx"}, &map.convention);
     reader.Flag("invert", &map.invert);
     reader.RefuseUnknown();
@@ -263,18 +263,23 @@ void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems
   reader->Number("min_psnr_db", 100, &job->min_psnr_db);
   reader->Flag("repair_nonfinite", &job->repair_nonfinite);
   reader->Flag("toksvig", &job->toksvig);
+  std::string working_space;
+  reader->Choice("working_space", {"lin_rec709", "acescg"}, &working_space);
+  reader->Text("color_space", false, kMaxColorSpaceName, &job->color_space);
+  reader->Text("ocio", false, 4096, &job->ocio);
   for (const char* key : {"file", "model"})
     reader->Refuse(key, "is a field of jobs of kind \"brdf\"; this job's kind is \"material\"");
   AssignEnum(profile, ParseProfile, &job->profile);
+  AssignEnum(working_space, ParseWorkingSpace, &job->working_space);
   if (address == "clamp") job->address = AddressMode::kClamp;
 }
 
 void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
   reader->Text("file", true, 4096, &job->file);
   if (const Json* model = reader->Find("model")) job->model = ReadModel(*model, problems);
-  for (const char* key :
-       {"folder", "set", "maps", "profile", "address", "normal_convention", "target_psnr_db",
-        "time_budget_s", "samples", "min_psnr_db", "repair_nonfinite", "toksvig"}) {
+  for (const char* key : {"folder", "set", "maps", "profile", "address", "normal_convention",
+                          "target_psnr_db", "time_budget_s", "samples", "min_psnr_db",
+                          "repair_nonfinite", "toksvig", "working_space", "color_space", "ocio"}) {
     reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"brdf\"");
   }
 }
@@ -417,6 +422,7 @@ Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
   job.file = Join(base_folder, job.file);
   job.folder = Join(base_folder, job.folder);
   job.out = Join(base_folder, job.out);
+  job.ocio = Join(base_folder, job.ocio);
   job.maps_folder = job.folder.empty() ? base_folder : job.folder;
   return job;
 }
@@ -469,6 +475,10 @@ std::string JobToJson(const Job& job) {
     json["normal_convention"] = job.normal_convention;
   if (job.repair_nonfinite) json["repair_nonfinite"] = true;
   if (!job.toksvig) json["toksvig"] = false;
+  if (job.working_space != defaults.working_space)
+    json["working_space"] = WorkingSpaceName(job.working_space);
+  if (job.color_space != defaults.color_space) json["color_space"] = job.color_space;
+  if (!job.ocio.empty()) json["ocio"] = job.ocio;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -498,6 +508,9 @@ std::string CanonicalJob(const Job& job) {
   json["normal_convention"] = job.normal_convention;
   json["repair_nonfinite"] = job.repair_nonfinite;
   json["toksvig"] = job.toksvig;
+  if (job.working_space != WorkingSpace::kLinearRec709)
+    json["working_space"] = WorkingSpaceName(job.working_space);
+  if (job.color_space != "auto") json["color_space"] = job.color_space;
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
+#include "pipeline/color/primaries.h"
 #include "pipeline/material/target_pyramid.h"
 #include "pipeline/material/train.h"
 
@@ -16,6 +17,7 @@ namespace patina {
 inline constexpr int kJobVersion = 1;
 inline constexpr size_t kMaxJobBytes = size_t{4} << 20;  // larger job files are refused
 inline constexpr size_t kMaxJobMaps = 64;
+inline constexpr size_t kMaxColorSpaceName = 255;       // characters
 inline constexpr uint64_t kMaxSeed = 9007199254740991;  // 2^53 - 1, exact in every JSON reader
 inline constexpr int kMaxThreads = 256;
 
@@ -25,7 +27,7 @@ struct JobMap {
   std::string file;      // absolute, or relative to Job::maps_folder
   std::string channels;  // letters of "rgba" in the order of the map's components; "" = the file's
                          // first ones
-  std::string color_space = "auto";  // "auto", "srgb", "linear", "raw"
+  std::string color_space = "auto";  // "auto", "srgb", "linear", "raw", or of the configuration
   std::string convention = "auto";   // "auto", "opengl", "directx"; of normal maps
   bool invert = false;               // the file holds 1 - value
 };
@@ -73,6 +75,10 @@ struct Job {
   std::string normal_convention = "auto";  // "auto", "opengl", "directx"
   bool repair_nonfinite = false;
   bool toksvig = true;
+  WorkingSpace working_space = WorkingSpace::kLinearRec709;
+  std::string color_space =
+      "auto";        // of colour maps that `maps` gives none; as JobMap::color_space
+  std::string ocio;  // OpenColorIO configuration; "": $OCIO, else the built-in one
 };
 
 // Parses a job. Relative folders are made relative to `base_folder` ("" leaves them as they are).
@@ -96,9 +102,10 @@ std::string JobToJson(const Job& job);
 
 // What of a job decides the bytes of its result, as text for the fingerprint: every field with its
 // value in a fixed order, without the folder and set it reads and the folder it writes to, the
-// thread count and the quality gate. Files of `maps` stand as their last path component; their
-// content, and that of `file`, enters the fingerprint by hash. The model of a BRDF stands with what
-// the recipe chose.
+// thread count, the quality gate and the configuration of colours, which enters by hash. Fields
+// that came after version 0.1 stand there when they are not their default. Files of `maps` stand as
+// their last path component; their content, and that of `file`, enters the fingerprint by hash. The
+// model of a BRDF stands with what the recipe chose.
 std::string CanonicalJob(const Job& job);
 
 // Whether a name can be an asset's: 1 to 100 of A-Z a-z 0-9 _ - . and not starting with - or '.'.

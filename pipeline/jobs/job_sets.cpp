@@ -102,8 +102,8 @@ Result<MapSet> MapsOfJob(const Job& job) {
       request.role = map.role;
       request.file = map.file;
       request.channels = map.channels;
+      request.color_space = map.color_space;
       // The parser has let no other names through.
-      request.color_space = ParseColorSpace(map.color_space).value_or(ColorSpace::kAuto);
       request.convention = ParseNormalConvention(map.convention).value_or(NormalConvention::kAuto);
       request.invert = map.invert;
       requests.push_back(std::move(request));

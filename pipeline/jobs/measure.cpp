@@ -19,6 +19,8 @@ const char* DecoderEncodingName(Decoder::Encoding encoding) {
       return EncodingName(Encoding::kSrgb);
     case Decoder::Encoding::kNormalXy:
       return EncodingName(Encoding::kNormalXy);
+    case Decoder::Encoding::kSignedLog:
+      return EncodingName(Encoding::kSignedLog);
     case Decoder::Encoding::kLinear:
       break;
   }
@@ -28,14 +30,16 @@ const char* DecoderEncodingName(Decoder::Encoding encoding) {
 metrics::MapKind KindOf(const TargetChannel& first, int channels) {
   if (first.encoding == Encoding::kNormalXy) return metrics::MapKind::kNormalXy;
   if (channels != 3) return metrics::MapKind::kData;
-  return first.encoding == Encoding::kSrgb ? metrics::MapKind::kSrgbColor
-                                           : metrics::MapKind::kLinearColor;
+  // Logarithms over their peak look as codes do: dark and bright are both seen.
+  return first.encoding == Encoding::kLinear ? metrics::MapKind::kLinearColor
+                                             : metrics::MapKind::kSrgbColor;
 }
 
 // A channel that both sides have.
 struct ChannelPair {
   const TargetChannel* reference = nullptr;
   const Decoder::Channel* decoded = nullptr;
+  float factor = 1;  // of coded values on both sides: 1 / CodedPeak
 };
 
 // What is measured: channels, map after map, and the maps.
@@ -71,11 +75,18 @@ Result<Layout> MatchChannels(const std::string& directory, const Decoder& decode
                       EncodingName(channel.encoding) +
                       "\"; compare it with maps of the kind it was baked from");
     }
+    if (channel.encoding == Encoding::kSignedLog && !channel.constant &&
+        channel.scale != decoded->scale) {
+      return Fail(ErrorCode::kConflict,
+                  directory + ": its " + channel.map +
+                      " has logarithms of another scale than the " +
+                      "source's would have; compare it with the maps it was baked from");
+    }
     if (layout.maps.empty() || layout.maps.back().name != channel.map) {
       layout.maps.push_back({channel.map, metrics::MapKind::kData, 0, false});
     }
     ++layout.maps.back().channels;
-    layout.channels.push_back({&channel, decoded});
+    layout.channels.push_back({&channel, decoded, 1 / CodedPeak(channel)});
   }
   for (const Decoder::Channel& channel : decoder.channels()) {
     const bool known =
@@ -130,15 +141,31 @@ class LevelPlanes {
 
   bool finite() const { return finite_; }
 
+  // Brings coded values to a peak of 1.
+  void Scale(const std::vector<ChannelPair>& channels, ThreadPool& pool) {
+    std::vector<const Decoder::Channel*> done;
+    for (const ChannelPair& pair : channels) {
+      if (pair.factor == 1.0f) continue;
+      if (!pair.reference->constant)
+        ScalePlane(&reference_, pair.reference->learned_index, pair.factor, pool);
+      const int output = pair.decoded->output;
+      const bool again = std::any_of(done.begin(), done.end(), [output](const Decoder::Channel* d) {
+        return d->output == output;
+      });
+      done.push_back(pair.decoded);
+      if (output >= 0 && !again) ScalePlane(&decoded_, output, pair.factor, pool);
+    }
+  }
+
   metrics::PlanePair Pair(const ChannelPair& channel) const {
     metrics::PlanePair pair;
     if (channel.reference->constant) {
-      pair.reference_constant = channel.reference->constant_value;
+      pair.reference_constant = channel.reference->constant_value * channel.factor;
     } else {
       pair.reference = Plane(reference_, channel.reference->learned_index);
     }
     if (channel.decoded->output < 0) {
-      pair.test_constant = channel.decoded->constant;
+      pair.test_constant = channel.decoded->constant * channel.factor;
     } else {
       pair.test = Plane(decoded_, channel.decoded->output);
     }
@@ -146,6 +173,14 @@ class LevelPlanes {
   }
 
  private:
+  void ScalePlane(AlignedBuffer<float>* planes, int index, float factor, ThreadPool& pool) const {
+    float* plane = planes->data() + static_cast<size_t>(index) * plane_;
+    pool.ParallelFor(height_, [&](int y, int) {
+      float* row = plane + static_cast<size_t>(y) * width_;
+      for (int x = 0; x < width_; ++x) row[x] *= factor;
+    });
+  }
+
   metrics::PlanarView Plane(const AlignedBuffer<float>& planes, int index) const {
     return metrics::DensePlane(planes.data() + static_cast<size_t>(index) * plane_, width_,
                                height_);
@@ -202,6 +237,7 @@ Result<Measurement> MeasureContainer(const std::string& directory,
       return Fail(ErrorCode::kInternal, directory + ": mip " + std::to_string(i) +
                                             " decodes to a value that is not finite");
     }
+    planes.Scale(layout.channels, pool);
     pairs.clear();
     for (const ChannelPair& channel : layout.channels) pairs.push_back(planes.Pair(channel));
     meter.AddLevel(levels[i].width, levels[i].height, pairs, pool);

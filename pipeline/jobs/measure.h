@@ -27,18 +27,19 @@ struct Measurement {
 // Decodes all mips of the container in `directory` with the reference decoder (formats/decoder),
 // from its files alone, and compares them with the reference on texel centres.
 //
-// PSNR: on coded values (sRGB for colour of integer files, 0.5 + 0.5 n for normals), peak 1. The
+// PSNR: on coded values (sRGB for colour of integer files, 0.5 + 0.5 n for normals), peak 1;
+// logarithms are divided by the largest they reach, so that this is their peak too. The
 // squared error of a mip is its mean over all texels and all channels of the source: z of normals
 // (rebuilt from x and y on both sides) and constant channels count like every other, so a plain
 // base colour, normal, packed set has nine. Overall: from the mean of that over all mips from 0
 // down to 1x1, each mip with the same weight (Weinreich 2024). mean_mips: the mean of the PSNRs of
 // the mips. SSIM, FLIP (of the base colour, or the first colour map) and the angle between normals:
-// mip 0 only, for time.
+// mip 0 only, for time; colours of another working space are taken for Rec.709 there.
 //
 // preview: null, or receives pictures of mip 0.
 // Errors: kNotFound, kCorruptData, kUnsupported, kResourceExhausted from the decoder; kConflict
-// when sizes or encodings differ or no map is in both; kInternal for a decoded value that is not
-// finite; kCancelled.
+// when sizes, encodings or scales of logarithms differ or no map is in both; kInternal for a
+// decoded value that is not finite; kCancelled.
 Result<Measurement> MeasureContainer(const std::string& directory,
                                      const MaterialReference& reference, ThreadPool& pool,
                                      const CancelToken& cancel, ProgressSink& progress,

@@ -162,8 +162,16 @@ Manifest DescribeContainer(const Job& job, const JobSource& source, const Traine
     entry.type = SampleTypeName(map.type);
     entry.inverted = map.inverted;
     entry.transfer = map.srgb ? "srgb" : "linear";
+    entry.color_space = map.color_space;
+    entry.color_rule = map.color_rule;
     manifest.maps.push_back(std::move(entry));
   }
+  manifest.working_space = WorkingSpaceName(job.working_space);
+  const ColorConfig& config = source.color_config;
+  manifest.color_config = ManifestColorConfig{
+      ConfigSourceName(config.source()),
+      config.file().empty() ? "" : ManifestPath(std::filesystem::path(config.file()).filename()),
+      config.sha256()};
   manifest.left_out = LeftOut(source.reference.material.channels);
   manifest.warnings = source.reference.warnings;
   return manifest;

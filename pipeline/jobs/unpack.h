@@ -11,9 +11,21 @@
 namespace patina {
 
 enum class UnpackFormat {
+  // PNG; but EXR for colours in a space of linear light, and where they go beyond 0 to 1 in a space
+  // that was asked for.
+  kAuto,
   kPng,  // 8 bit for sources of 8 bit, else 16; colour sRGB-coded, data as it is
   kExr   // half floats for sources of 8 bit and half floats, else floats; colour linear, data as it
          // is
+};
+
+struct UnpackOptions {
+  int mip = 0;
+  UnpackFormat format = UnpackFormat::kAuto;
+  // Of colour maps: a space of the configuration. Empty: as files are read that say nothing, sRGB
+  // in PNG and linear Rec.709 in EXR, whatever the container's working space is.
+  std::string space;
+  std::string ocio;  // the configuration; empty: $OCIO, else the built-in one
 };
 
 struct Unpacked {
@@ -21,13 +33,15 @@ struct Unpacked {
   std::vector<std::string> warnings;  // values that the format cannot hold
 };
 
-// Decodes mip `mip` of a container (see OpenContainer for `container`) and writes one image for
-// each map into `folder` (made if missing), named by role: albedo.png, normal.png, ao.png ... in
-// the size of that mip. Normals are 0.5 + 0.5 n of x, y, z, OpenGL, in both formats. Existing files
-// of those names are replaced. Errors: those of OpenContainer, VerifyPayloads and the decoder;
-// kUnsupported for a BRDF;
-// kOutOfRange for a mip the source does not have; kCancelled, kIo, kResourceExhausted.
-Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder, int mip,
-                                 UnpackFormat format, ThreadPool& pool, const CancelToken& cancel);
+// Decodes mip `options.mip` of a container (see OpenContainer for `container`) and writes one image
+// for each map into `folder` (made if missing), named by role: albedo.png, normal.png, ao.png ...
+// in the size of that mip. Normals are 0.5 + 0.5 n of x, y, z, OpenGL, in both formats. Existing
+// files of those names are replaced. Errors: those of OpenContainer, VerifyPayloads and the
+// decoder; kUnsupported for a BRDF; kOutOfRange for a mip the source does not have; kCancelled,
+// kIo, kResourceExhausted. Data maps are the same in every space. EXR files of ACEScg and
+// ACES2065-1 name their primaries. Also errors of ColorConfig, led by "--ocio" or "--space".
+Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder,
+                                 const UnpackOptions& options, ThreadPool& pool,
+                                 const CancelToken& cancel);
 
 }  // namespace patina

@@ -100,6 +100,17 @@ void FillNormalPlan(const LoadedFile& file, MapPlan* plan) {
     plan->channels.pop_back();
 }
 
+// Data have no colour: only the words of old job files are let through.
+Status CheckDataSpace(const MapSource& source) {
+  for (const char* word : {"auto", "srgb", "linear", "raw"}) {
+    if (source.color_space == word) return {};
+  }
+  return Fail(ErrorCode::kInvalidArgument,
+              ColorPointer(source) + ": " + source.role +
+                  " is data, which is never converted, and cannot be in the colour space \"" +
+                  source.color_space + "\"; leave it out");
+}
+
 void NormalRow(const MapPlan& plan, int width, float* const planes[3], NormalDefects* defects) {
   const bool has_z = plan.channels.size() == 3;
   const float scale = plan.signed_samples ? 1.0f : 2.0f,
@@ -140,7 +151,8 @@ const char* ComponentName(MapKind kind, int component) {
 }
 
 Result<MapPlan> PlanMap(const MapSource& source, int file_index, const LoadedFile& file,
-                        std::vector<std::string>* warnings, std::vector<MapNote>* notes) {
+                        const ColorOptions& color, std::vector<std::string>* warnings,
+                        std::vector<MapNote>* notes) {
   MapPlan plan;
   plan.role = FindMapRole(source.role);
   if (plan.role == nullptr) {
@@ -164,16 +176,19 @@ Result<MapPlan> PlanMap(const MapSource& source, int file_index, const LoadedFil
       plan.encoding = Encoding::kNormalXy;
       FillNormalPlan(file, &plan);
       break;
-    case MapKind::kColor:
-      plan.srgb = source.color_space == ColorSpace::kSrgb ||
-                  (source.color_space == ColorSpace::kAuto && IsInteger(file.image.info.type));
-      plan.encoding = plan.srgb ? Encoding::kSrgb : Encoding::kLinear;
-      break;
+    case MapKind::kColor: {
+      PATINA_ASSIGN(plan.color, ChooseColor(source, file.image.info, color, warnings));
+      plan.srgb = plan.color.srgb;
+      // Integers are as fine as they are in their own curve.
+      const bool codes = IsInteger(file.image.info.type) && !plan.color.linear_light;
+      plan.encoding = plan.srgb || codes ? Encoding::kSrgb : Encoding::kLinear;
+    } break;
     case MapKind::kScalar:
     case MapKind::kVector2:
-      plan.srgb = source.color_space == ColorSpace::kSrgb;
+      plan.srgb = source.color_space == "srgb";
       break;
   }
+  if (plan.role->kind != MapKind::kColor) PATINA_TRY(CheckDataSpace(source));
   plan.constant_file = std::all_of(plan.channels.begin(), plan.channels.end(),
                                    [&](int c) { return stats.constant(c); });
   return plan;
@@ -199,11 +214,31 @@ void LoadMapRow(const MapPlan& plan, const LoadedFile& file, int width, int y,
   }
   for (int i = 0; i < used; ++i) {
     // Colours stay as codes; data that is said to be sRGB-coded is wanted linear.
-    if (plan.srgb && plan.encoding != Encoding::kSrgb) SrgbToLinearRow(planes[i], width, planes[i]);
+    if (plan.srgb && plan.role->kind != MapKind::kColor)
+      SrgbToLinearRow(planes[i], width, planes[i]);
     if (plan.invert) {
       for (int x = 0; x < width; ++x) planes[i][x] = 1.0f - planes[i][x];
     }
   }
+  if (plan.color.transform != nullptr)
+    plan.color.transform->Apply(planes[0], planes[1], planes[2], static_cast<size_t>(width));
+}
+
+void EncodeMapRow(const MapPlan& plan, const float* loaded, int width, float* coded) {
+  const auto count = static_cast<size_t>(width);
+  if (plan.encoding == Encoding::kNormalXy) {
+    for (int x = 0; x < width; ++x) coded[x] = 0.5f + 0.5f * loaded[x];
+  } else if (plan.encoding == Encoding::kSignedLog) {
+    SignedLogRow(loaded, count, plan.scale, coded);
+  } else if (plan.encoding == Encoding::kSrgb && !plan.loads_coded()) {
+    LinearToSrgbRow(loaded, count, coded);
+  } else if (coded != loaded) {
+    std::copy_n(loaded, width, coded);
+  }
+}
+
+void LinearizeMapRow(const MapPlan& plan, float* loaded, int width) {
+  if (plan.loads_coded()) SrgbToLinearRow(loaded, static_cast<size_t>(width), loaded);
 }
 
 }  // namespace patina

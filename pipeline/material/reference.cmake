@@ -1,4 +1,6 @@
 add_library(patina_reference STATIC
+  ${CMAKE_CURRENT_LIST_DIR}/color_choice.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/color_encoding.cpp
   ${CMAKE_CURRENT_LIST_DIR}/map_plan.cpp
   ${CMAKE_CURRENT_LIST_DIR}/mip_filter.cpp
   ${CMAKE_CURRENT_LIST_DIR}/normal_convention.cpp

@@ -12,6 +12,7 @@
 
 #include "pipeline/color/color.h"
 #include "pipeline/image/resize.h"
+#include "pipeline/material/color_encoding.h"
 #include "pipeline/material/map_plan.h"
 #include "pipeline/material/mip_filter.h"
 #include "pipeline/material/source_maps.h"
@@ -64,6 +65,9 @@ class Builder {
 
   Result<SourceReference> Run() {
     Report(0);
+    PATINA_TRY(
+        ChooseEncodings(files_, result_.files, result_.width, result_.height,
+                        options_.color.logarithms, pool_, &plans_));
     MeasureMip0();
     DescribeChannels();
     DescribeMaps();
@@ -86,12 +90,6 @@ class Builder {
   void Warn(const std::string& warning) {
     result_.warnings.push_back(warning);
     progress_.OnWarning(warning);
-  }
-
-  // Codes of a row of one map as they are learned. For normals, planes hold the vector and are not
-  // touched.
-  static void EncodeNormal(const float* component, int count, float* coded) {
-    for (int x = 0; x < count; ++x) coded[x] = 0.5f + 0.5f * component[x];
   }
 
   // Scratch of each worker: the rows of one map and one coded row.
@@ -133,12 +131,8 @@ class Builder {
           LoadMapRow(plan, files_[plan.file], width, y, s.planes.data(),
                      &defects[task * plans_.size() + p]);
           for (int c = 0; c < plan.components(); ++c) {
-            const float* coded = s.planes[c];
-            if (plan.encoding == Encoding::kNormalXy) {
-              EncodeNormal(coded, width, s.coded.data());
-              coded = s.coded.data();
-            }
-            range[c].Add(coded, width);
+            EncodeMapRow(plan, s.planes[c], width, s.coded.data());
+            range[c].Add(s.coded.data(), width);
           }
           if (IsOpacity(plan)) {
             for (int x = 0; x < width; ++x) visible[task] += s.planes[0][x] >= kOpacityCutoff;
@@ -193,6 +187,7 @@ class Builder {
           channel.min_value /= channel.scale;
           channel.max_value /= channel.scale;
         }
+        if (channel.encoding == Encoding::kSignedLog) channel.scale = plan.scale;
         channel.learned_index = channel.constant ? -1 : learned++;
         result_.material.channels.push_back(std::move(channel));
       }
@@ -220,25 +215,32 @@ class Builder {
       map.file_channels.assign(plan.channels.begin(), plan.channels.begin() + plan.components());
       map.type = result_.files[plan.file].type;
       map.inverted = plan.invert;
-      map.srgb = plan.srgb;
+      map.srgb = plan.srgb || plan.color.space == "sRGB";
+      if (plan.role->kind == MapKind::kColor) {
+        map.color_space = plan.color.space;
+        map.color_rule = ColorRuleName(plan.color.rule);
+        map.converted = plan.color.transform != nullptr;
+      }
       map.convention = plan.convention;
+      map.encoding = plan.encoding;
       map.resized = file.resized;
       result_.maps.push_back(std::move(map));
     }
   }
 
-  // Coded values of ordinary maps are their own; those far above 1 or below it are brought near 1 by
-  // a power of two, which is exact both ways.
+  // Coded values of ordinary maps are their own; those far above 1 or below it are brought near 1
+  // by a power of two, which is exact both ways.
   static float ScaleOfRange(float low, float high) {
     const float largest = std::max(std::abs(low), std::abs(high));
     if (largest <= 1.0f && largest >= 0x1p-10f) return 1.0f;
     return std::clamp(std::exp2(std::ceil(std::log2(largest))), 0x1p-100f, 0x1p100f);
   }
 
-  // Writes a row of one channel, divided by its scale.
+  // Writes a row of one channel; a linear one divided by its scale.
   void StoreScaledRow(TargetLevel* level, int y, int channel, float* coded) const {
-    const float scale = result_.material.channels[channel].scale;
-    if (scale != 1.0f) {
+    const TargetChannel& described = result_.material.channels[channel];
+    const float scale = described.scale;
+    if (scale != 1.0f && described.encoding == Encoding::kLinear) {
       for (int x = 0; x < level->width; ++x) coded[x] /= scale;
     }
     StoreRow(level, y, Learned(channel), coded);
@@ -326,15 +328,11 @@ class Builder {
           for (int c = 0; c < plan.components() && mine; ++c) {
             const int channel = Learned(places[p].channel + c);
             if (channel < 0) continue;
-            if (plan.encoding == Encoding::kNormalXy) {
-              EncodeNormal(s.planes[c], width, s.coded.data());
-            } else {
-              std::copy_n(s.planes[c], width, s.coded.data());
-            }
+            EncodeMapRow(plan, s.planes[c], width, s.coded.data());
             StoreScaledRow(&mip0, row, places[p].channel + c, s.coded.data());
           }
           for (int i = 0; i < plan.work_planes(); ++i) {
-            if (plan.encoding == Encoding::kSrgb) SrgbToLinearRow(s.planes[i], width, s.planes[i]);
+            LinearizeMapRow(plan, s.planes[i], width);
             AddBoxRow(s.planes[i], width, taps.weight[tap], next.Row(places[p].plane + i, y));
           }
         }
@@ -415,6 +413,9 @@ class Builder {
         }
         return;
       }
+      case Encoding::kSignedLog:
+        SignedLogRow(in, width, plans_[p].scale, coded);
+        return;
       case Encoding::kLinear:
         break;
     }

@@ -11,6 +11,7 @@
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/image/image.h"
 #include "pipeline/image/map_finder.h"
+#include "pipeline/material/color_choice.h"
 #include "pipeline/material/target_pyramid.h"
 
 namespace patina {
@@ -29,6 +30,7 @@ struct ReferenceOptions {
   // Mips of roughness grow by the variance of the normals below them (see WidenRoughness), where
   // both maps exist and neither is constant.
   bool widen_roughness = true;
+  ColorOptions color;
   uint64_t max_texels = uint64_t{1} << 26;  // of mip 0; larger sets are refused
   const CancelToken* cancel = nullptr;
 };
@@ -53,7 +55,12 @@ struct ReferenceMap {
   std::vector<int> file_channels;
   SampleType type = SampleType::kUint8;
   bool inverted = false;  // the file holds 1 - value
-  bool srgb = false;      // the file's numbers are sRGB-coded; otherwise linear
+  bool srgb = false;  // the file's numbers are sRGB-coded; otherwise linear, or as color_space says
+  // Of a colour; empty for data, which are never converted.
+  std::string color_space;
+  std::string color_rule;  // see ColorRuleName
+  bool converted = false;  // to the working space
+  Encoding encoding = Encoding::kLinear;
   // Of a normal map's file; kAuto for all others.
   NormalConvention convention = NormalConvention::kAuto;
   bool resized = false;  // the file is smaller than the reference and was enlarged
@@ -72,8 +79,9 @@ struct SourceReference {
 
 // Reads the files of `set` and builds the reference.
 //
-// Channels stand in the order of MapRoles(). Coded values: colours of integer files as their sRGB
-// codes, other colours linear; normals as 0.5 + 0.5 n, OpenGL, unit length (a texel without
+// Channels stand in the order of MapRoles(). Coded values: colours of integer files as the sRGB
+// curve of the working space's values, other colours linear or, where they span a large range, as
+// logarithms (see ChooseEncodings); normals as 0.5 + 0.5 n, OpenGL, unit length (a texel without
 // direction counts as (0, 0, 1), points below the surface are raised to it, z is rebuilt from x and
 // y where the file has none or a constant one); data as the file has them, or 1 - value.
 // Size: that of the largest map; smaller ones are enlarged by ResizeBicubic, with a warning. Maps
@@ -87,8 +95,8 @@ struct SourceReference {
 //
 // The result does not depend on the number of threads. Sets the threads of SetImageIoThreads to
 // those of `pool`. Errors: those of ReadImage; kInvalidArgument (an empty set, a normal map of one
-// channel, channels that a file does not have), kCorruptData (NaN or infinity, with count and first
-// place), kOutOfRange (max_texels), kResourceExhausted, kCancelled.
+// channel, channels that a file does not have, colour spaces), kCorruptData (NaN or infinity, with
+// count and first place), kOutOfRange (max_texels), kResourceExhausted, kCancelled.
 Result<SourceReference> BuildReference(const MapSet& set, const ReferenceOptions& options,
                                        ThreadPool& pool, ProgressSink& progress);
 

@@ -129,7 +129,7 @@ class Loader {
       const int file = file_of_path_.at(source.path);
       std::vector<std::string> warnings;
       PATINA_ASSIGN(MapPlan plan,
-                    PlanMap(source, file, maps_.files[file], &warnings, &maps_.notes));
+                    PlanMap(source, file, maps_.files[file], options_.color, &warnings, &maps_.notes));
       for (const std::string& warning : warnings) Warn(warning);
       if (plan.channels.empty()) continue;
       if (plan.role->kind == MapKind::kNormal) {

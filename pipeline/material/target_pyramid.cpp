@@ -1,6 +1,7 @@
 #include "pipeline/material/target_pyramid.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 namespace patina {
@@ -10,8 +11,14 @@ const char* EncodingName(Encoding encoding) {
     case Encoding::kLinear: return "linear";
     case Encoding::kSrgb: return "srgb";
     case Encoding::kNormalXy: return "normal_xy";
+    case Encoding::kSignedLog: return "signed_log";
   }
   return "linear";
+}
+
+float CodedPeak(const TargetChannel& channel) {
+  if (channel.encoding != Encoding::kSignedLog) return 1.0f;
+  return std::max({1.0f, std::abs(channel.min_value), std::abs(channel.max_value)});
 }
 
 void TargetLevel::Allocate(int level_width, int level_height, int level_channels) {

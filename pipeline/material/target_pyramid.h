@@ -16,10 +16,11 @@ enum class AddressMode { kWrap, kClamp };
 // How a learned ("coded") value relates to the physical one. Names reach the manifest.
 enum class Encoding {
   kLinear,    // coded = value / scale: data maps, and colour that came linear (float files)
-  kSrgb,      // coded = sRGB transfer curve of linear Rec.709 reflectance
-  kNormalXy   // coded = 0.5 + 0.5 * x of a unit tangent-space normal, OpenGL (Y up); z = sqrt(1 - x^2 - y^2)
+  kSrgb,      // coded = sRGB transfer curve of the working space's linear values
+  kNormalXy,  // coded = 0.5 + 0.5 * x of a unit tangent-space normal, OpenGL (Y up); z = sqrt(1 - x^2 - y^2)
+  kSignedLog  // coded = sign(x) log2(1 + |x| / scale): colour of large range
 };
-const char* EncodingName(Encoding encoding);  // "linear", "srgb", "normal_xy"
+const char* EncodingName(Encoding encoding);  // "linear", "srgb", "normal_xy", "signed_log"
 
 // One output channel of a material, in manifest order.
 struct TargetChannel {
@@ -28,11 +29,15 @@ struct TargetChannel {
   Encoding encoding = Encoding::kLinear;
   bool constant = false;   // every texel of mip 0 has constant_value exactly: not learned
   float constant_value = 0;  // coded
-  float scale = 1;         // kLinear only: a power of two that brings coded values near [-1, 1], where half weights hold them
+  // A power of two. kLinear: brings coded values near [-1, 1], where half weights hold them. kSignedLog: see there. Else 1.
+  float scale = 1;
   float min_value = 0;     // range of mip 0, coded; decoders clamp to it
   float max_value = 1;
   int learned_index = -1;  // channel of the TargetPyramid, or -1 when constant
 };
+
+// What an error of the channel's coded values is measured against: 1, but for logarithms the largest magnitude they reach.
+float CodedPeak(const TargetChannel& channel);
 
 // One mip level, all learned channels, coded values as float.
 // Layout: data[((y * row_blocks + xb) * channels + c) * 16 + lane] is channel c of texel (16*xb + lane, y).

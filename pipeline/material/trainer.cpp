@@ -69,6 +69,11 @@ Trainer::Trainer(const MaterialReference& reference, const ModelShape& shape, Fe
       next_slots_(windows_per_step),
       gradient_(network->parameter_count()) {
   channel_weight_ = ChannelWeights(reference);
+  for (const TargetChannel& channel : reference.channels) {
+    if (channel.learned_index < 0) continue;
+    const double peak = static_cast<double>(CodedPeak(channel));
+    error_weight_.push_back(1 / (peak * peak));
+  }
   for (int k = 0; k < pool.threads(); ++k) scratch_.push_back(std::make_unique<WindowScratch>());
   for (Slot& slot : next_slots_) {
     slot.spec = Draw();
@@ -232,7 +237,10 @@ ModelError Trainer::Evaluate(FeatureStore* store, const float* network, int off_
   const int outputs = network_->outputs();
   const int mips = static_cast<int>(reference_.pyramid.levels.size());
   ModelError error;
-  for (int mip = 0; mip < mips; ++mip) error.mip_mse.push_back(MipMse(store, network, mip));
+  for (int mip = 0; mip < mips; ++mip) {
+    error.mip_mse.push_back(MipMse(store, network, mip));
+    for (int c = 0; c < outputs; ++c) error.mip_mse.back()[c] *= error_weight_[c];
+  }
   if (off_grid_windows == 0) return error;
 
   // Its own stream: asking does not change the training.
@@ -254,7 +262,7 @@ ModelError Trainer::Evaluate(FeatureStore* store, const float* network, int off_
   });
   double total = 0, samples = 0;
   for (size_t k = 0; k < specs.size(); ++k) {
-    for (int c = 0; c < outputs; ++c) total += sums[k * (outputs + 1) + c];
+    for (int c = 0; c < outputs; ++c) total += error_weight_[c] * sums[k * (outputs + 1) + c];
     samples += sums[k * (outputs + 1) + outputs];
   }
   error.off_grid_mse = total / samples / outputs;

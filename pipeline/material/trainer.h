@@ -25,7 +25,7 @@ struct WindowDraw {
   float off_grid_share = 0.15f; // of windows at continuous (u, v, s); 1 for the paper
 };
 
-// Squared errors on texel centres, [mip][learned channel], as means; and off the grid.
+// Squared errors on texel centres, [mip][learned channel], as means, with CodedPeak as 1; and off the grid.
 struct ModelError {
   std::vector<std::vector<double>> mip_mse;  // [mip][channel]
   double off_grid_mse = 0;                   // mean over channels, random (u, v, s); 0 if not asked for
@@ -85,6 +85,7 @@ class Trainer {
   WindowDraw draw_;
   std::vector<double> mip_cumulative_;
   std::vector<float> channel_weight_;
+  std::vector<double> error_weight_;  // [channel]: 1 / CodedPeak^2, of the errors that are reported
   std::vector<std::unique_ptr<WindowScratch>> scratch_;
   std::vector<Slot> slots_;       // this step's windows
   std::vector<Slot> next_slots_;  // planned while this step runs

@@ -107,7 +107,10 @@ Status Run(const Options& options) {
     return Fail(ErrorCode::kIo, "no scratch folder can be made: set TMPDIR");
   PATINA_ASSIGN(const std::vector<MapSet> sets, FindMaps(options.folder));
   for (const MapSet& set : sets) {
-    PATINA_ASSIGN(const SourceReference source, BuildReference(set, {}, pool, NoProgress()));
+    ReferenceOptions reading;
+    // The codecs hold 0 to 1: scaled values, no logarithms.
+    reading.color.logarithms = LogEncoding::kNever;
+    PATINA_ASSIGN(const SourceReference source, BuildReference(set, reading, pool, NoProgress()));
     const MaterialReference& reference = source.material;
     const auto measure = [&](PeerCodec& codec, int first_level, const std::string& suffix,
                              bool nearest) -> Status {

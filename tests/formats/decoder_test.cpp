@@ -273,6 +273,13 @@ TEST(Decoder, GivesPhysicalValues) {
   EXPECT_NEAR(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kSrgb), 0.5f), 0.21404114,
               1e-7);  // IEC 61966-2-1
   EXPECT_NEAR(Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kSrgb), 0.04f), 0.04 / 12.92, 1e-9);
+  const auto log_of = [](float coded, float scale) {
+    return Decoder::ToPhysical(ChannelOf(Decoder::Encoding::kSignedLog, scale), coded);
+  };
+  EXPECT_EQ(log_of(0, 0.25f), 0.0f);
+  EXPECT_EQ(log_of(3, 0.25f), 1.75f);
+  EXPECT_EQ(log_of(-3, 0.25f), -1.75f);
+  EXPECT_FLOAT_EQ(log_of(17.609641f, 0.5f), 99999.5f);
   EXPECT_FLOAT_EQ(Decoder::NormalZ(0.6f, 0.0f), 0.8f);
   EXPECT_EQ(Decoder::NormalZ(0.9f, 0.9f), 0.0f);
 
@@ -436,7 +443,7 @@ TEST_F(DecoderLoad, RefusesInfiniteTexels) {
 TEST_F(DecoderLoad, RefusesWhatItCannotDecode) {
   const auto original = Bytes("manifest.json");
   for (const auto& [pointer, value] : std::initializer_list<std::pair<const char*, nlohmann::json>>{
-           {"/format_version", 2},
+           {"/format_version", 3},
            {"/kind", "brdf"},
            {"/source/address", "mirror"},
            {"/network/activation", "gelu"},

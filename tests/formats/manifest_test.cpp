@@ -86,7 +86,7 @@ TEST(Manifest, IgnoresFieldsOfNewerWriters) {
 
 TEST(Manifest, RefusesANewerFormatVersion) {
   json document = FullDocument();
-  document["format_version"] = 2;
+  document["format_version"] = kManifestVersion + 1;
   const auto manifest = ParseManifest(document.dump());
   ASSERT_FALSE(manifest);
   EXPECT_EQ(manifest.error().code, ErrorCode::kUnsupported);
@@ -240,7 +240,7 @@ TEST(Manifest, ReaderSaysUnsupportedForWhatItCannotDecode) {
            {"/network/activation", "gelu"},
            {"/source/address", "mirror"},
            {"/features/0/format", "BC7"},
-           {"/color/working_space", "acescg"}}) {
+           {"/color/working_space", "rec2020"}}) {
     json document = FullDocument();
     document[json::json_pointer(pointer)] = value;
     const auto manifest = ParseManifest(document.dump());

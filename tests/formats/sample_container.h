@@ -54,9 +54,10 @@ inline Manifest FullManifest() {
                        {"normal", "y", "normal_xy", 0, 1, 3, 0},
                        {"roughness", "", "linear", 0.3f, 1e-30f + 0.7f, 4, 0}};
   manifest.channels.back().scale = 4;
-  manifest.maps = {{"albedo", 0, {0, 1, 2}, "uint8", false, "srgb"},
-                   {"roughness", 1, {1}, "half", true, "linear"},
-                   {"normal", -1, {}, "uint16", false, "linear"}};
+  manifest.maps = {{"albedo", 0, {0, 1, 2}, "uint8", false, "srgb", "sRGB", "tag"},
+                   {"roughness", 1, {1}, "half", true, "linear", "", ""},
+                   {"normal", -1, {}, "uint16", false, "linear", "", ""}};
+  manifest.color_config = ManifestColorConfig{"file", "config.ocio", HexOf('8')};
   manifest.quality.psnr_overall_db = 36.5;
   manifest.quality.psnr_mip0_db = 30.625;
   manifest.quality.psnr_mean_mips_db = INFINITY;

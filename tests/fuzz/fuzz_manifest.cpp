@@ -43,7 +43,7 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
   manifest.network = ManifestNetwork{"w", 3, 16, 1, "relu"};
   manifest.channels = {{"albedo", "r", "srgb", 0.1f, 0.9f, 0, 0},
                        {"ao", "", "linear", 0, 1, -1, 0.5f}};
-  manifest.maps = {{"albedo", 0, {0}, "uint8", false, "srgb"}};
+  manifest.maps = {{"albedo", 0, {0}, "uint8", false, "srgb", "sRGB", "default"}};
   manifest.quality.ssim = 0.5;
   manifest.quality.maps = {{"albedo", {30.5, 0.5, 0.25, 1.5}, {{30.5, {}, {}, {}}}}};
   manifest.quality.gate_min_psnr_db = 10;

@@ -75,6 +75,60 @@ class DaemonTest : public testing::Test {
   patina::test::TemporaryDirectory folder_;
 };
 
+// A configuration with a table beside it, which the sandbox must let through too.
+void WriteColorConfig(const std::string& folder) {
+  fs::create_directories(folder + "/luts");
+  std::ofstream(folder + "/config.ocio") << R"(ocio_profile_version: 2
+search_path: luts
+roles: {aces_interchange: ap0, default: ap0}
+displays:
+  sRGB:
+    - !<View> {name: Raw, colorspace: ap0}
+colorspaces:
+  - !<ColorSpace>
+    name: ap0
+  - !<ColorSpace>
+    name: tabled
+    to_scene_reference: !<FileTransform> {src: table.spi1d, interpolation: linear}
+)";
+  std::ofstream(folder + "/luts/table.spi1d")
+      << "Version 1\nFrom 0.0 1.0\nLength 3\nComponents 1\n{\n0.0\n0.25\n1.0\n}\n";
+}
+
+TEST_F(DaemonTest, ColourConfigurationsAreTheOperatorsOrLieInTheInputFolders) {
+  WriteColorConfig(folder_ / "studio");
+  auto daemon = Start({"OCIO=" + (folder_ / "studio/config.ocio")});
+  Drop("floor", 1);
+  const std::string manifest = folder_ / "out/floor/current/manifest.json";
+  Until(daemon.get(), [&] { return fs::exists(manifest); });
+  EXPECT_NE(ReadAll(manifest).find("\"source\": \"environment\""), std::string::npos);
+  // Named by a job: within the input folders, with its table.
+  WriteColorConfig(folder_ / "drop/floor/colors");
+  const std::vector<std::string> submit{"submit",
+                                        folder_ / "drop/floor",
+                                        "--wait",
+                                        "--socket",
+                                        folder_ / "state/patinad.sock",
+                                        "--color-space",
+                                        "tabled",
+                                        "--working-space",
+                                        "acescg",
+                                        "--ocio"};
+  std::vector<std::string> inside = submit, outside = submit;
+  inside.push_back(folder_ / "drop/floor/colors/config.ocio");
+  outside.push_back(folder_ / "studio/config.ocio");
+  const auto done = Patina(inside);
+  EXPECT_EQ(done.exit_code, 0) << done.err << Log();
+  const std::string text = ReadAll(manifest);
+  EXPECT_NE(text.find("\"source\": \"file\""), std::string::npos);
+  EXPECT_NE(text.find("\"color_space\": \"tabled\""), std::string::npos);
+  EXPECT_NE(text.find("\"working_space\": \"acescg\""), std::string::npos);
+  const auto refused = Patina(outside);
+  EXPECT_EQ(refused.exit_code, 3) << refused.err;
+  EXPECT_NE(refused.err.find("/ocio"), std::string::npos) << refused.err;
+  Stop(daemon.get());
+}
+
 TEST_F(DaemonTest, BakesWhatIsDroppedAsTheCommandDoesAndOnlyOnce) {
   auto daemon = Start();
   Drop("floor", 1);

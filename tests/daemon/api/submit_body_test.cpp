@@ -32,6 +32,17 @@ TEST(SubmitBody, FillsInWhatIsAbsent) {
   EXPECT_FALSE(parsed.request.memory_mb.has_value());
 }
 
+TEST(SubmitBody, CarriesColoursAndWantsTheirConfigurationAbsolute) {
+  const std::string job = R"({"job": {"kind": "material", "asset": "wall", "folder": "/maps",
+    "working_space": "acescg", "color_space": "ACEScg", "ocio": )";
+  const ParsedSubmit parsed = ParseSubmit(job + R"("/studio/config.ocio"}})", "/out");
+  ASSERT_TRUE(parsed.problems.empty()) << parsed.problems[0].detail;
+  EXPECT_EQ(parsed.request.job.working_space, WorkingSpace::kAcesCg);
+  EXPECT_EQ(parsed.request.job.color_space, "ACEScg");
+  EXPECT_EQ(parsed.request.job.ocio, "/studio/config.ocio");
+  EXPECT_THAT(Pointers(job + R"("config.ocio"}})"), ElementsAre("/job/ocio"));
+}
+
 TEST(SubmitBody, TakesEveryField) {
   const ParsedSubmit parsed = ParseSubmit(
       R"({"job": {"version": 1, "kind": "brdf", "asset": "gold", "file": "/g.binary",

@@ -1,5 +1,6 @@
 #include "daemon/service/roots.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -43,6 +44,28 @@ TEST(Roots, AJobsPathsAreReplacedByWhatTheyResolveTo) {
   EXPECT_EQ(job.maps[0].file, real + "/albedo.png");
   job.maps[0].file = "../../secret.png";
   EXPECT_EQ(patina::test::MessageOf(ConfineJob(roots, &job)).rfind("/maps/0/file: ", 0), 0u);
+}
+
+TEST(Roots, AColourConfigurationLiesWithinTheRootsAndIsReadWithItsTables) {
+  const patina::test::TemporaryDirectory folder;
+  fs::create_directories(folder / "in/wall");
+  fs::create_directories(folder / "in/studio");
+  std::ofstream(folder / "in/studio/config.ocio") << "c";
+  std::ofstream(folder / "secret.ocio") << "s";
+  const Roots roots{{folder / "in"}, {folder / "out"}};
+  Job job;
+  job.folder = folder / "in/wall";
+  job.out = folder / "out";
+  job.ocio = folder / "in/wall/../studio/config.ocio";
+  ASSERT_OK(ConfineJob(roots, &job));
+  const std::string real = fs::canonical(folder / "in/studio").string();
+  EXPECT_EQ(job.ocio, real + "/config.ocio");
+  const std::vector<std::string> inputs = InputsOf(job, roots);
+  EXPECT_NE(std::find(inputs.begin(), inputs.end(), real), inputs.end());
+  for (const std::string& outside : {folder / "secret.ocio", std::string("config.ocio")}) {
+    job.ocio = outside;
+    EXPECT_EQ(patina::test::MessageOf(ConfineJob(roots, &job)).rfind("/ocio: ", 0), 0u) << outside;
+  }
 }
 
 TEST(Roots, LinksWithinTheRootsAreInputsToo) {

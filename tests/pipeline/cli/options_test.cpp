@@ -62,7 +62,13 @@ TEST(ParseCommandLine, ReadsEveryOptionOfBake) {
                                           "--no-toksvig",
                                           "--repair-nonfinite",
                                           "--normal-convention",
-                                          "directx"});
+                                          "directx",
+                                          "--working-space",
+                                          "acescg",
+                                          "--color-space",
+                                          "ACES - ACEScg",
+                                          "--ocio",
+                                          "c.ocio"});
   ASSERT_TRUE(parsed.command) << parsed.text;
   const JobOverrides& job = parsed.command->bake.job;
   EXPECT_EQ(parsed.command->bake.inputs.size(), 2u);
@@ -73,6 +79,9 @@ TEST(ParseCommandLine, ReadsEveryOptionOfBake) {
   EXPECT_EQ(job.time_budget_s, 60);
   EXPECT_EQ(job.min_psnr_db, 30);
   EXPECT_EQ(job.recipe, "paper");
+  EXPECT_EQ(job.working_space, "acescg");
+  EXPECT_EQ(job.color_space, "ACES - ACEScg");
+  EXPECT_EQ(job.ocio, "c.ocio");
   EXPECT_EQ(job.seed, 9u);
   EXPECT_EQ(job.threads, 2);
   EXPECT_EQ(job.address, "clamp");

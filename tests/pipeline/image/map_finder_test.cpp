@@ -364,17 +364,17 @@ class MapList : public MapFinder {
 TEST_F(MapList, IsTakenAtItsWord) {
   Add("one.png", 4);
   Add("two.png");
-  MapRequest albedo{"albedo", "one.png", "bgr", ColorSpace::kLinear, NormalConvention::kAuto,
+  MapRequest albedo{"albedo", "one.png", "bgr", "linear", NormalConvention::kAuto,
                     false};
   MapRequest normal{"normal",          folder_ / "two.png",        "",
-                    ColorSpace::kAuto, NormalConvention::kDirectX, false};
-  MapRequest rough{"roughness", "one.png", "a", ColorSpace::kAuto, NormalConvention::kAuto, true};
+                    "auto", NormalConvention::kDirectX, false};
+  MapRequest rough{"roughness", "one.png", "a", "auto", NormalConvention::kAuto, true};
   auto set = ResolveMaps({rough, normal, albedo}, folder_.path(), "thing");
   ASSERT_TRUE(set) << set.error().message;
   EXPECT_EQ(set->name, "thing");
   ASSERT_EQ(set->maps.size(), 3u);
   EXPECT_EQ(set->maps[0].channels, "bgr");
-  EXPECT_EQ(set->maps[0].color_space, ColorSpace::kLinear);
+  EXPECT_EQ(set->maps[0].color_space, "linear");
   EXPECT_EQ(set->maps[1].convention, NormalConvention::kDirectX);
   EXPECT_FALSE(set->maps[1].convention_from_name);
   EXPECT_EQ(set->maps[2].role, "roughness");
@@ -384,7 +384,7 @@ TEST_F(MapList, IsTakenAtItsWord) {
 TEST_F(MapList, UnpacksPackedRoles) {
   Add("one.png");
   auto set =
-      ResolveMaps({{"orm", "one.png", "", ColorSpace::kAuto, NormalConvention::kAuto, false}},
+      ResolveMaps({{"orm", "one.png", "", "auto", NormalConvention::kAuto, false}},
                   folder_.path(), "x");
   ASSERT_TRUE(set) << set.error().message;
   EXPECT_THAT(Summary(*set),
@@ -395,7 +395,7 @@ TEST_F(MapList, IsRefusedWithTheEntryNamed) {
   Add("one.png");
   const auto request = [](const std::string& role, const std::string& file,
                           const std::string& channels = "") {
-    return MapRequest{role, file, channels, ColorSpace::kAuto, NormalConvention::kAuto, false};
+    return MapRequest{role, file, channels, "auto", NormalConvention::kAuto, false};
   };
   EXPECT_EQ(ResolveError({}).code, ErrorCode::kInvalidArgument);
   const Error unknown = ResolveError({request("albedo", "one.png"), request("colour", "one.png")});

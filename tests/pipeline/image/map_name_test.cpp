@@ -141,9 +141,9 @@ TEST(ParseMapName, KeepsTilesLevelsAndVariantsApart) {
 }
 
 TEST(ParseMapName, ReadsColourSpaceWords) {
-  EXPECT_EQ(ParseMapName("wall_albedo_linear").color_space, ColorSpace::kLinear);
-  EXPECT_EQ(ParseMapName("wall_albedo_sRGB").color_space, ColorSpace::kSrgb);
-  EXPECT_EQ(ParseMapName("wall_albedo").color_space, ColorSpace::kAuto);
+  EXPECT_EQ(ParseMapName("wall_albedo_linear").color_space, "linear");
+  EXPECT_EQ(ParseMapName("wall_albedo_sRGB").color_space, "srgb");
+  EXPECT_EQ(ParseMapName("wall_albedo").color_space, "auto");
 }
 
 TEST(MapTokens, NameOnlyKnownRolesAndChannels) {

@@ -67,7 +67,11 @@ TEST(ParseJob, ReadsEveryFieldOfTheFullExample) {
   EXPECT_EQ(job->normal_convention, "opengl");
   EXPECT_TRUE(job->repair_nonfinite);
   EXPECT_FALSE(job->toksvig);
-  ASSERT_EQ(job->maps.size(), 6u);
+  ASSERT_EQ(job->maps.size(), 7u);
+  EXPECT_EQ(job->maps[5].color_space, "Utility - Linear - P3-D65");
+  EXPECT_EQ(job->working_space, WorkingSpace::kAcesCg);
+  EXPECT_EQ(job->color_space, "auto");
+  EXPECT_EQ(job->ocio, Example("studio/config.ocio"));
   EXPECT_EQ(job->maps[0].color_space, "srgb");
   EXPECT_EQ(job->maps[1].convention, "directx");
   EXPECT_EQ(job->maps[3].role, "roughness");
