@@ -389,7 +389,7 @@ class Decoder {
     float scale = 1;  // kLinear: physical = coded * scale
     float min = 0;    // coded values are clamped to [min, max]
     float max = 1;
-    int output = -1;     // of the network, or -1: constant
+    int output = -1;     // of the network, which equal channels share, or -1: constant
     float constant = 0;  // coded
   };
 
@@ -735,7 +735,7 @@ class Decoder {
       return corrupt("/format is not \"patina-container\"");
     const int version = Integer(Member(manifest, "format_version"), 1, INT32_MAX);
     if (version < 1) return corrupt("/format_version is not a positive integer");
-    if (version > 1) return unsupported("/format_version is newer than this decoder");
+    if (version > 2) return unsupported("/format_version is newer than this decoder");
     if (Text(Member(manifest, "kind")) != "material")
       return unsupported("/kind is not \"material\"");
     const nlohmann::json& source = Member(manifest, "source");
@@ -810,8 +810,11 @@ class Decoder {
       } else {
         channel.output = Integer(output, 0, outputs_ - 1);
         const auto index = static_cast<size_t>(channel.output);
-        if (channel.output < 0 || used[index])
+        if (channel.output < 0)
           return failure->Set(LoadStatus::kCorrupt, place + "/output is not legal");
+        // Equal channels share an output, which is clamped once.
+        if (used[index] && (output_min_[index] != channel.min || output_max_[index] != channel.max))
+          return failure->Set(LoadStatus::kCorrupt, place + "/range is not legal");
         used[index] = true;
         output_min_[index] = channel.min;
         output_max_[index] = channel.max;

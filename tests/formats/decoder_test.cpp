@@ -436,7 +436,7 @@ TEST_F(DecoderLoad, RefusesInfiniteTexels) {
 TEST_F(DecoderLoad, RefusesWhatItCannotDecode) {
   const auto original = Bytes("manifest.json");
   for (const auto& [pointer, value] : std::initializer_list<std::pair<const char*, nlohmann::json>>{
-           {"/format_version", 2},
+           {"/format_version", 3},
            {"/kind", "brdf"},
            {"/source/address", "mirror"},
            {"/network/activation", "gelu"},
