@@ -162,8 +162,10 @@ void AddBake(CLI::App* app, CommandLine* line) {
                     "[maps] Do not raise the roughness of coarser mips by the variance of the "
                     "normals they average");
   command
-      ->add_option("--material", o.materials,
-                   "[scenes] Bake only this material, by its name or # and index; may be repeated")
+      ->add_option(
+          "--material", o.materials,
+          "[scenes] Bake only this material: its name, or # and its index where others have the "
+          "same; may be repeated")
       ->type_name("NAME");
   command->add_flag("--learn-all", o.job.learn_all,
                     "[maps] Learn every channel and mip there is, constant and unused ones too");
