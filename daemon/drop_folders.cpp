@@ -13,6 +13,7 @@
 #include "daemon/base/clock.h"
 #include "daemon/watch/watcher.h"
 #include "pipeline/image/map_groups.h"
+#include "pipeline/jobs/scene_job.h"
 
 namespace patina::daemon {
 namespace {
@@ -116,20 +117,83 @@ class WatchedFolders : public DropFolders, public AssetSource {
       offer.job.file = asset.path;
       return {offer};
     }
+    std::vector<AssetOffer> offers;
+    std::set<std::string> claimed;
+    OfferScenes(root, asset.path, offer, &claimed, &offers);
     offer.job.folder = asset.path;
+    if (!offers.empty() || !claimed.empty()) {
+      auto unclaimed = UnclaimedSets(asset.path, claimed);
+      if (!unclaimed) return offers;  // images that are no sets are the scene's
+      OfferSets(asset, *unclaimed, offer, &offers);
+      return offers;
+    }
     const auto sets = FindSetNames(asset.path);
     // What is wrong with a folder the job says, for all to read.
     if (!sets || sets->size() < 2) return {offer};
+    OfferSets(asset, *sets, offer, &offers);
+    return offers;
+  }
+
+  // The materials of the scenes of a folder; and the files that scenes of it, or of folders above
+  // it, refer to. Named after folder, scene and material. Of a scene that cannot be read an offer
+  // whose run will say why.
+  static void OfferScenes(const std::string& root, const std::string& folder,
+                          const AssetOffer& pattern, std::set<std::string>* claimed,
+                          std::vector<AssetOffer>* offers) {
+    for (std::string above = folder;; above = ParentOf(above)) {
+      for (const std::string& path : FindSceneFiles(above)) {
+        const auto scene = ReadScene(path);
+        if (scene) {
+          for (std::string& file : FilesOfScene(*scene)) claimed->insert(std::move(file));
+        }
+        if (above != folder) continue;
+        AssetOffer offer = pattern;
+        offer.job.scene = path;
+        if (!scene) {
+          offer.job.asset = AssetNameFromPath(pattern.job.asset + "_scene");
+          offer.job.scene_material = "#0";
+          offers->push_back(std::move(offer));
+          continue;
+        }
+        for (const SceneMaterial& material : scene->materials) {
+          offer.job.asset = AssetNameFromPath(pattern.job.asset + "_" + material.asset);
+          offer.job.scene_material = SceneMaterialKey(*scene, material);
+          offers->push_back(offer);
+        }
+      }
+      if (above == root || above.size() <= root.size()) return;
+    }
+  }
+
+  // The sets of a folder none of whose files belongs to a scene.
+  static Result<std::vector<std::string>> UnclaimedSets(const std::string& folder,
+                                                        const std::set<std::string>& claimed) {
+    PATINA_ASSIGN(const GroupedMaps grouped, GroupMaps(folder));
+    std::vector<std::string> sets;
+    std::error_code ignored;
+    const auto is_claimed = [&](const MapCandidate* candidate) {
+      return claimed.count(std::filesystem::weakly_canonical(candidate->path, ignored).string()) !=
+             0;
+    };
+    for (const MapGroup& group : grouped.groups) {
+      if (std::none_of(group.own.begin(), group.own.end(), is_claimed))
+        sets.push_back(group.set_name);
+    }
+    return sets;
+  }
+
+  // Each set of a folder, named after folder and set.
+  static void OfferSets(const ReadyAsset& asset, const std::vector<std::string>& sets,
+                        AssetOffer offer, std::vector<AssetOffer>* all) {
     const std::string folder = std::filesystem::path(asset.path).filename().string();
-    std::vector<AssetOffer> offers;
-    for (const std::string& set : *sets) {
+    std::vector<AssetOffer>& offers = *all;
+    for (const std::string& set : sets) {
       const bool prefixed = set.rfind(folder + "_", 0) == 0;
       const std::string suffix = prefixed ? set.substr(folder.size()) : "_" + set;
       offer.job.set = set;
       offer.job.asset = AssetNameFromPath(asset.name + suffix);
       offers.push_back(offer);
     }
-    return offers;
   }
 
   Status Offer(const std::string& root, const ReadyAsset& asset) {

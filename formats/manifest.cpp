@@ -1,14 +1,16 @@
 #include "formats/manifest.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "formats/dds.h"
 #include "formats/index_pack.h"
 #include "formats/json_view.h"
 #include "formats/manifest_check.h"
+#include "formats/manifest_json.h"
+#include "formats/scene/scene_json.h"
 
 namespace patina {
 namespace {
@@ -16,15 +18,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kFormatName = "patina-container";
-
-// A double that prints with the digits of the float and reads back as the same float.
-double FloatAsWritten(float value) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
-  double written = 0;
-  std::from_chars(text, end, written);
-  return static_cast<float>(written) == value ? written : static_cast<double>(value);
-}
 
 ordered_json NullIfInfinite(double value) {
   return std::isinf(value) ? ordered_json(nullptr) : ordered_json(value);
@@ -468,18 +461,6 @@ void ReadColor(const JsonView& json, Manifest* manifest) {
   manifest->color_config->sha256 = config.Field("sha256").String();
 }
 
-ordered_json LeftOutToJson(const std::vector<ManifestLeftOut>& left_outs) {
-  ordered_json json = ordered_json::array();
-  for (const ManifestLeftOut& left_out : left_outs) {
-    ordered_json entry;
-    entry["what"] = left_out.what;
-    entry["reason"] = left_out.reason;
-    entry["saved"] = left_out.saved;
-    json.push_back(std::move(entry));
-  }
-  return json;
-}
-
 Status CheckVersion(const JsonView& json, const JsonProblem& problem) {
   const std::string format = json.Field("format").String();
   if (problem.text.empty() && format != kFormatName) {
@@ -505,10 +486,13 @@ Status CheckVersion(const JsonView& json, const JsonProblem& problem) {
 }  // namespace
 
 int FormatVersionOf(const Manifest& manifest) {
-  const bool logarithms =
-      std::any_of(manifest.channels.begin(), manifest.channels.end(),
-                  [](const ManifestChannel& channel) { return channel.encoding == "signed_log"; });
-  return logarithms || manifest.working_space != "lin_rec709" ? 2 : 1;
+  if (manifest.lod_range || manifest.working_space != "lin_rec709") return 2;
+  std::set<int> outputs;
+  for (const ManifestChannel& channel : manifest.channels) {
+    if (channel.encoding == "signed_log") return 2;
+    if (channel.output >= 0 && !outputs.insert(channel.output).second) return 2;
+  }
+  return 1;
 }
 
 Result<std::string> ToJson(const Manifest& manifest) {
@@ -537,6 +521,8 @@ Result<std::string> ToJson(const Manifest& manifest) {
     if (manifest.network) json["network"] = NetworkToJson(*manifest.network);
     json["channels"] = ChannelsToJson(manifest.channels);
     json["maps"] = MapsToJson(manifest.maps);
+    if (manifest.lod_range) json["lod_range"] = *manifest.lod_range;
+    if (manifest.scene) json["scene"] = SceneLookToJson(*manifest.scene);
   }
   json["color"] = ColorToJson(manifest);
   if (manifest.brdf) {
@@ -545,7 +531,9 @@ Result<std::string> ToJson(const Manifest& manifest) {
     json["quality"] = QualityToJson(manifest.quality);
     json["training"] = TrainingToJson(manifest.training);
   }
-  json["left_out"] = LeftOutToJson(manifest.left_out);
+  if (!manifest.brdf || !manifest.effects.empty())
+    json["effects"] = EffectsToJson(manifest.effects);
+  json["left_out"] = ordered_json::array();  // where versions before `effects` look
   json["warnings"] = manifest.warnings;
   std::string text = json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
   // What is written must be readable: this also finds strings and lists above the reader's limits.
@@ -595,13 +583,17 @@ Result<Manifest> ParseManifest(std::string_view text) {
     if (const JsonView network = json.Optional("network")) manifest.network = ReadNetwork(network);
     ReadChannels(json.Field("channels"), &problem, &manifest.channels);
     ReadMaps(json.Field("maps"), &manifest.maps);
+    if (const JsonView range = json.Optional("lod_range")) {
+      std::vector<int> mips;
+      range.ForEach(2, [&](const JsonView& mip) { mips.push_back(mip.Int(0, 31)); });
+      mips.resize(2, -1);  // CheckManifest refuses what is not there
+      manifest.lod_range = {mips[0], mips[1]};
+    }
+    if (const JsonView scene = json.Optional("scene")) manifest.scene = SceneLookFromJson(scene);
     manifest.quality = ReadQuality(json.Field("quality"));
     manifest.training = ReadTraining(json.Field("training"));
   }
-  json.Field("left_out").ForEach(kMaxEntries, [&](const JsonView& entry) {
-    manifest.left_out.push_back({entry.Field("what").String(), entry.Field("reason").String(),
-                                 entry.Field("saved").String()});
-  });
+  manifest.effects = EffectsFromJson(json);
   json.Field("warnings").ForEach(kMaxEntries, [&](const JsonView& warning) {
     manifest.warnings.push_back(warning.String());
   });

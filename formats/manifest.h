@@ -13,12 +13,13 @@
 #include <vector>
 
 #include "formats/base/result.h"
+#include "formats/scene/scene.h"
 
 namespace patina {
 
 // What readers read up to. Written is the lowest version whose readers decode the container
-// rightly: 2 for channels of encoding "signed_log" and for working spaces other than "lin_rec709",
-// else 1.
+// rightly: 2 for channels of encoding "signed_log", working spaces other than "lin_rec709", channels
+// that share an output and containers with a lod_range, else 1.
 inline constexpr int kManifestVersion = 2;
 inline constexpr size_t kMaxManifestBytes = size_t{8} << 20;  // readers refuse larger files
 inline constexpr int kMaxManifestFeatures = 16;
@@ -93,7 +94,7 @@ struct ManifestChannel {
       "linear";  // "linear", "srgb", "normal_xy" or "signed_log": coded value -> physical value
   float range_min = 0;  // coded; decoders clamp to it
   float range_max = 1;
-  int output = -1;     // output of the network, or -1 for a constant
+  int output = -1;     // output of the network, which equal channels share, or -1 for a constant
   float constant = 0;  // coded; used when output < 0
   // > 0. Of "linear": physical value = coded value * scale. Of "signed_log": physical value =
   // scale * sign(coded) * (exp2(|coded|) - 1).
@@ -165,10 +166,19 @@ struct ManifestTraining {
   std::vector<ManifestCurvePoint> curve;
 };
 
-struct ManifestLeftOut {
-  std::string what;    // e.g. "metalness"
-  std::string reason;  // e.g. "constant 0"
-  std::string saved;   // e.g. "1 network output"
+// What an effect saved against learning it, computed from the model.
+struct ManifestSavings {
+  uint64_t bytes = 0;                 // for an engine to load
+  uint64_t decode_multiply_adds = 0;  // of one lookup
+  uint64_t train_samples = 0;
+  uint64_t train_multiply_adds = 0;
+};
+
+struct ManifestEffect {
+  std::string what;    // "metalness", "albedo.r", "normal.z", "mips 0 to 1", ...
+  std::string state;   // "learned", "constant", "derived", "left_out"
+  std::string reason;  // "constant 0", "alphaMode is OPAQUE", ...; empty of what is learned
+  std::optional<ManifestSavings> saved;
 };
 
 // One input file of a BRDF.
@@ -236,16 +246,19 @@ struct Manifest {
   std::string quality_setting = "standard";  // "preview", "standard", "reference"
   ManifestSource source;                     // [material]
   std::vector<ManifestPayload> payloads;
-  std::vector<ManifestFeature> features;     // [material] empty when every channel is constant
-  std::optional<ManifestNetwork> network;    // [material] likewise
-  std::vector<ManifestChannel> channels;     // [material]
-  std::vector<ManifestMap> maps;             // [material]
+  std::vector<ManifestFeature> features;   // [material] empty when every channel is constant
+  std::optional<ManifestNetwork> network;  // [material] likewise
+  std::vector<ManifestChannel> channels;   // [material]
+  std::vector<ManifestMap> maps;           // [material]
+  // [material] The mips of the source that are stored; absent: all.
+  std::optional<std::array<int, 2>> lod_range;
+  std::optional<SceneLook> scene;            // [material] if it comes from a scene
   std::optional<ManifestBrdf> brdf;          // of kind "brdf", and only there
   std::string working_space = "lin_rec709";  // of physical colour values; or "acescg"
   std::optional<ManifestColorConfig> color_config;  // [material] absent before 0.2
   ManifestQuality quality;                          // [material]
   ManifestTraining training;                        // [material]
-  std::vector<ManifestLeftOut> left_out;
+  std::vector<ManifestEffect> effects;
   std::vector<std::string> warnings;
 };
 

@@ -9,6 +9,8 @@
 #include "formats/base/names.h"
 #include "formats/dds.h"
 #include "formats/index_pack.h"
+#include "formats/manifest_json.h"
+#include "formats/scene/scene_json.h"
 
 namespace patina {
 namespace {
@@ -72,6 +74,21 @@ Status FullChain(const Pointer& pointer, int width, int height, int levels) {
   return {};
 }
 
+Status PartOfChain(const Pointer& pointer, int width, int height, int levels) {
+  PATINA_TRY(Sides(pointer, width, height));
+  return InRange(pointer + "/levels", levels, 1, DdsFullChainLevels(width, height));
+}
+
+Status CheckLodRange(const Manifest& manifest) {
+  if (!manifest.lod_range) return {};
+  const auto [first, last] = *manifest.lod_range;
+  if (first < 0 || first > last || last >= manifest.source.levels) {
+    return Bad("/lod_range", "not two mips of the source's " +
+                                 std::to_string(manifest.source.levels) + ", the smaller first");
+  }
+  return {};
+}
+
 Status CheckType(const Pointer& pointer, const std::string& type) {
   return OneOf(pointer, type, {"uint8", "uint16", "uint32", "half", "float", "double"});
 }
@@ -130,7 +147,8 @@ Status CheckModel(const Manifest& manifest) {
     const ManifestFeature& feature = manifest.features[i];
     const Pointer at = "/features/" + std::to_string(i);
     PATINA_TRY(CheckReference(at + "/payload", manifest, feature.payload, "features"));
-    PATINA_TRY(FullChain(at, feature.width, feature.height, feature.levels));
+    PATINA_TRY(manifest.lod_range ? PartOfChain(at, feature.width, feature.height, feature.levels)
+                                  : FullChain(at, feature.width, feature.height, feature.levels));
     PATINA_TRY(InRange(at + "/lod_bias", feature.lod_bias, -31, 0));
     PATINA_TRY(
         OneOf(at + "/format", feature.format, {"BC6H_UF16", "BC6H_SF16"}, ErrorCode::kUnsupported));
@@ -154,7 +172,7 @@ Status CheckModel(const Manifest& manifest) {
 
 Status CheckChannels(const Manifest& manifest) {
   const int outputs = manifest.network ? manifest.network->outputs : 0;
-  std::vector<bool> used(static_cast<size_t>(outputs), false);
+  std::vector<const ManifestChannel*> users(static_cast<size_t>(outputs), nullptr);
   std::set<std::pair<std::string, std::string>> seen;
   std::set<std::string> finished_maps;
   if (manifest.channels.empty()) return Bad("/channels", "no channel");
@@ -196,18 +214,23 @@ Status CheckChannels(const Manifest& manifest) {
     }
     if (channel.output < 0) {
       if (!std::isfinite(channel.constant)) return Bad(at + "/constant", "not a finite number");
-    } else if (channel.output >= outputs || used[static_cast<size_t>(channel.output)]) {
-      return Bad(at + "/output", std::to_string(channel.output) +
-                                     " is used twice or not one of the network's " +
+    } else if (channel.output >= outputs) {
+      return Bad(at + "/output", std::to_string(channel.output) + " is not one of the network's " +
                                      std::to_string(outputs) + " outputs");
     } else {
-      used[static_cast<size_t>(channel.output)] = true;
+      const ManifestChannel*& user = users[static_cast<size_t>(channel.output)];
+      // Decoders clamp an output once.
+      if (user != nullptr &&
+          (user->range_min != channel.range_min || user->range_max != channel.range_max)) {
+        return Bad(at + "/range", "not that of the channel before it that has the same output");
+      }
+      user = &channel;
     }
   }
-  const auto unused = std::find(used.begin(), used.end(), false);
-  if (unused != used.end()) {
+  const auto unused = std::find(users.begin(), users.end(), nullptr);
+  if (unused != users.end()) {
     return Bad("/network/outputs",
-               "output " + std::to_string(unused - used.begin()) + " belongs to no channel");
+               "output " + std::to_string(unused - users.begin()) + " belongs to no channel");
   }
   return {};
 }
@@ -374,9 +397,11 @@ Status CheckMaterial(const Manifest& manifest) {
   if (manifest.brdf) return Bad("/brdf", "in a manifest of kind \"material\"");
   PATINA_TRY(NotEmpty("/profile", manifest.profile));
   PATINA_TRY(CheckSource(manifest.source));
+  PATINA_TRY(CheckLodRange(manifest));
   PATINA_TRY(CheckModel(manifest));
   PATINA_TRY(CheckChannels(manifest));
   PATINA_TRY(CheckMaps(manifest));
+  if (manifest.scene) PATINA_TRY(CheckSceneLook(*manifest.scene));
   PATINA_TRY(CheckQuality(manifest));
   return CheckTraining(manifest.training);
 }
@@ -395,6 +420,7 @@ Status CheckManifest(const Manifest& manifest) {
     return Bad("/seed", std::to_string(manifest.seed) + " is 2^63 or more");
   PATINA_TRY(NotEmpty("/quality_setting", manifest.quality_setting));
   PATINA_TRY(CheckPayloads(manifest));
+  PATINA_TRY(CheckEffects(manifest.effects));
   PATINA_TRY(OneOf("/color/working_space", manifest.working_space, {"lin_rec709", "acescg"},
                    ErrorCode::kUnsupported));
   if (manifest.color_config) {

@@ -56,11 +56,13 @@ std::string RecipeTag(const Job& job) {
   const int version = job.kind == JobKind::kBrdf ? kBrdfRecipeVersion : kRecipeVersion;
   return std::string(JobKindName(job.kind)) + " recipe " + std::to_string(version) + "\n" +
          CanonicalJob(job) + "\n" + job.folder + "\n" + job.set + "\n" + job.file + "\n" +
+         (job.scene.empty() ? "" : job.scene + "\n" + job.scene_material + "\n") +
          (job.ocio.empty() ? "" : job.ocio + "\n");
 }
 
 std::string SourceOf(const Job& job) {
   if (job.kind == JobKind::kBrdf) return job.file;
+  if (!job.scene.empty()) return job.scene;
   return job.folder.empty() && !job.maps.empty() ? job.maps[0].file : job.folder;
 }
 
@@ -225,6 +227,8 @@ class RealService : public DaemonService {
     job.folder = offer.job.folder;
     job.set = offer.job.set;
     job.file = offer.job.file;
+    job.scene = offer.job.scene;
+    job.scene_material = offer.job.scene_material;
     job.out = config->out;
     job.quality = config->job.quality;
     job.recipe = config->job.recipe;

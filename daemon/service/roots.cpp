@@ -62,6 +62,7 @@ Status ConfineJob(const Roots& roots, Job* job) {
   if (job->kind == JobKind::kBrdf) return Confine("/file", roots.input, "input_roots", &job->file);
   if (!job->folder.empty())
     PATINA_TRY(Confine("/folder", roots.input, "input_roots", &job->folder));
+  if (!job->scene.empty()) PATINA_TRY(Confine("/scene", roots.input, "input_roots", &job->scene));
   for (size_t i = 0; i < job->maps.size(); ++i) {
     std::string& file = job->maps[i].file;
     if (!file.empty() && file.front() != '/' && !job->folder.empty())
@@ -79,6 +80,8 @@ std::vector<std::string> InputsOf(const Job& job, const Roots& roots) {
   for (const JobMap& map : job.maps) inputs.push_back(map.file);
   // Its tables lie beside it or below.
   if (!job.ocio.empty()) inputs.push_back(fs::path(job.ocio).parent_path().string());
+  // A scene reads nothing from outside of its folder.
+  if (!job.scene.empty()) inputs.push_back(FolderOfFile(job.scene));
   if (job.folder.empty()) return inputs;
   inputs.push_back(job.folder);
   constexpr int kMostLinks = 1000;

@@ -12,6 +12,7 @@
 #include "formats/base/file_io.h"
 #include "formats/base/sha256.h"
 #include "formats/brdf/brdf_source.h"
+#include "formats/scene/scene.h"
 #include "pipeline/image/map_name.h"
 
 namespace patina::daemon {
@@ -78,7 +79,8 @@ FileRole RoleOfFile(std::string_view name) {
     return FileRole::kNone;
   if (IsHiddenName(name)) return FileRole::kOther;
   const std::string text(name);
-  if (HasImageExtension(text)) return FileRole::kImage;
+  // A scene is baked with the images beside it.
+  if (HasImageExtension(text) || IsSceneFileName(text)) return FileRole::kImage;
   return brdf::HasBrdfExtension(text) ? FileRole::kBrdf : FileRole::kOther;
 }
 

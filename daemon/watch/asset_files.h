@@ -11,7 +11,7 @@
 namespace patina::daemon {
 
 enum class FileRole {
-  kImage,  // a map, perhaps
+  kImage,  // a map, perhaps, or a scene
   kBrdf,   // measurements, perhaps: some of the extensions are used by other programs, too
   kOther,  // its changes show that somebody is at work in the folder
   kNone    // says nothing: ours (*.failed.json), or what file managers leave behind

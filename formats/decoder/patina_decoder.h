@@ -390,7 +390,7 @@ class Decoder {
     float scale = 1;  // of kLinear and kSignedLog
     float min = 0;    // coded values are clamped to [min, max]
     float max = 1;
-    int output = -1;     // of the network, or -1: constant
+    int output = -1;     // of the network, which equal channels share, or -1: constant
     float constant = 0;  // coded
   };
 
@@ -820,8 +820,11 @@ class Decoder {
       } else {
         channel.output = Integer(output, 0, outputs_ - 1);
         const auto index = static_cast<size_t>(channel.output);
-        if (channel.output < 0 || used[index])
+        if (channel.output < 0)
           return failure->Set(LoadStatus::kCorrupt, place + "/output is not legal");
+        // Equal channels share an output, which is clamped once.
+        if (used[index] && (output_min_[index] != channel.min || output_max_[index] != channel.max))
+          return failure->Set(LoadStatus::kCorrupt, place + "/range is not legal");
         used[index] = true;
         output_min_[index] = channel.min;
         output_max_[index] = channel.max;

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -12,6 +14,7 @@
 #include "pipeline/jobs/event_log.h"
 #include "pipeline/jobs/job_plan.h"
 #include "pipeline/jobs/job_runner.h"
+#include "pipeline/jobs/scene_manifest.h"
 
 namespace patina {
 namespace {
@@ -46,6 +49,10 @@ std::string MapOptions(const JobOverrides& given) {
   add(given.ocio.has_value(), "--ocio");
   add(given.repair_nonfinite, "--repair-nonfinite");
   add(given.no_toksvig, "--no-toksvig");
+  add(given.learn_all, "--learn-all");
+  add(!given.effects_off.empty(), "--effect-off");
+  add(given.constant_tolerance.has_value(), "--constant-tolerance");
+  add(given.lod_range.has_value(), "--lod-range");
   return names;
 }
 
@@ -64,6 +71,7 @@ void Apply(const JobOverrides& overrides, Job* job) {
     return;
   }
   Override(overrides.profile, ParseProfile, &job->profile);
+  if (overrides.address) job->address_given = true;
   if (overrides.address)
     job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
   Override(overrides.normal_convention, &job->normal_convention);
@@ -76,6 +84,58 @@ void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.ocio, &job->ocio);
   if (overrides.repair_nonfinite) job->repair_nonfinite = true;
   if (overrides.no_toksvig) job->toksvig = false;
+  for (const char* name : EffectNames()) {
+    if (overrides.learn_all) *EffectSwitch(&job->effects, name) = false;
+  }
+  // The command line has let no other names through.
+  for (const std::string& name : overrides.effects_off) *EffectSwitch(&job->effects, name) = false;
+  Override(overrides.constant_tolerance, &job->effects.constant_tolerance);
+  if (overrides.lod_range) job->lod_range = {(*overrides.lod_range)[0], (*overrides.lod_range)[1]};
+}
+
+// Of --material: what else scenes hold is not baked; what they do not hold is an error.
+void KeepChosenMaterials(const std::vector<std::string>& wanted, std::vector<PlannedJob>* plan) {
+  if (wanted.empty()) return;
+  std::set<std::string> missing(wanted.begin(), wanted.end());
+  std::string known;
+  std::erase_if(*plan, [&](const PlannedJob& planned) {
+    if (!planned.job || planned.job->scene.empty()) return false;
+    const std::string& name = planned.job->scene_material;
+    known += (known.empty() ? "" : ", ") + name;
+    missing.erase(name);
+    missing.erase(planned.asset);
+    return std::find(wanted.begin(), wanted.end(), name) == wanted.end() &&
+           std::find(wanted.begin(), wanted.end(), planned.asset) == wanted.end();
+  });
+  for (const std::string& name : missing) {
+    plan->push_back(
+        {AssetNameFromPath(name),
+         Fail(ErrorCode::kNotFound, "no scene here has a material \"" + name +
+                                        "\"; there are: " + (known.empty() ? "none" : known))});
+  }
+}
+
+// Writes the manifest of each scene that something was baked of. False if one could not be written.
+bool WriteSceneManifests(const std::vector<PlannedJob>& plan, const std::vector<JobResult>& results,
+                         Verbosity verbosity) {
+  std::map<std::pair<std::string, std::string>, std::map<std::string, std::string>> scenes;
+  for (const PlannedJob& planned : plan) {
+    if (!planned.job || planned.job->scene.empty()) continue;
+    auto& problems = scenes[{planned.job->scene, planned.job->out}];
+    for (const JobResult& result : results) {
+      if (result.asset == planned.asset && result.error)
+        problems[planned.asset] = result.error->message;
+    }
+  }
+  bool written = true;
+  for (const auto& [scene, problems] : scenes) {
+    auto path = WriteSceneManifest(scene.first, scene.second, problems);
+    if (!path) PrintError(path.error().message);
+    written = written && path;
+    if (path && verbosity != Verbosity::kQuiet)
+      std::fprintf(stderr, "patina: the scene is described in %s\n", path->c_str());
+  }
+  return written;
 }
 
 std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
@@ -103,15 +163,18 @@ std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
     for (PlannedJob& planned : plan) {
       if (!maps) planned.job = Fail(maps.error());
       if (!planned.job) continue;
-      if (planned.job->kind == JobKind::kBrdf) {
+      const bool brdf = planned.job->kind == JobKind::kBrdf;
+      if (brdf || !planned.job->scene.empty()) {
         planned.job = Fail(ErrorCode::kInvalidArgument,
-                           "--maps describes a texture set, and this is a BRDF; leave it out");
+                           std::string("--maps describes a texture set, and this is a ") +
+                               (brdf ? "BRDF" : "scene") + "; leave it out");
         continue;
       }
       planned.job->maps = *maps;
       planned.job->maps_folder = FolderOfFile(options.map_list);
     }
   }
+  KeepChosenMaterials(options.materials, &plan);
   std::set<std::string> taken;
   for (PlannedJob& planned : plan) {
     if (!planned.job) continue;
@@ -198,6 +261,12 @@ int BakeCommand(const CommandLine& line, const CancelToken& cancel) {
   std::vector<std::optional<JobResult>> shared(plan.size());
   if (options.share > 1) RunShared(plan, options.share, line.verbosity, cancel, &shared);
   std::vector<JobResult> results;
+  const auto of_scenes = std::count_if(plan.begin(), plan.end(), [](const PlannedJob& planned) {
+    return planned.job && !planned.job->scene.empty();
+  });
+  SharedImages images;
+  RunGuards guards;
+  if (of_scenes > 1) guards.images = &images;
   int worst = kExitDone;
   for (size_t i = 0; i < plan.size(); ++i) {
     const PlannedJob& planned = plan[i];
@@ -207,13 +276,16 @@ int BakeCommand(const CommandLine& line, const CancelToken& cancel) {
       continue;  // what is shared and behind it may be done
     } else if (planned.job) {
       TerminalProgress progress(stderr, line.verbosity, planned.asset);
-      results.push_back(RunJob(*planned.job, progress, cancel));
+      results.push_back(RunJob(*planned.job, progress, cancel, guards));
     } else {
       results.push_back(Unplanned(planned.asset, planned.job.error()));
     }
     Print(results.back(), line);
     if (Severity(results.back().exit_code) > Severity(worst)) worst = results.back().exit_code;
   }
+  if (!WriteSceneManifests(plan, results, line.verbosity) &&
+      Severity(worst) < Severity(kExitFailed))
+    worst = kExitFailed;
   if (plan.size() > 1 && line.verbosity != Verbosity::kQuiet) {
     std::fputs(SummaryText(results, plan.size()).c_str(), line.json ? stderr : stdout);
   }

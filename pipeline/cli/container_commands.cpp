@@ -11,6 +11,7 @@
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
 #include "pipeline/jobs/sample_brdf.h"
+#include "pipeline/jobs/sample_scene.h"
 #include "pipeline/jobs/sample_set.h"
 #include "pipeline/jobs/unpack.h"
 
@@ -108,14 +109,21 @@ int EvalCommand(const CommandLine& line) {
 int SampleCommand(const CommandLine& line) {
   const SampleOptions& options = line.sample;
   std::vector<std::string> paths;
-  if (options.kind != "brdf") {
+  if (options.kind == "scene") {
+    ThreadPool pool(line.threads);
+    SetImageIoThreads(pool.threads());
+    auto written = WriteSampleScene(options.out, options.size, options.seed, pool);
+    if (!written) return FailCommand(written.error());
+    paths = std::move(*written);
+  }
+  if (options.kind == "material" || options.kind == "all") {
     ThreadPool pool(line.threads);
     SetImageIoThreads(pool.threads());
     auto written = WriteSampleSet(options.out, options.size, options.seed, pool);
     if (!written) return FailCommand(written.error());
     paths = std::move(*written);
   }
-  if (options.kind != "material") {
+  if (options.kind == "brdf" || options.kind == "all") {
     SampleBrdfOptions brdfs;
     brdfs.noise.seed = options.seed;
     const bool all = options.kind == "brdf";

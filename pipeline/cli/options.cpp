@@ -2,6 +2,7 @@
 #include "pipeline/cli/options.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <limits>
 #include <sstream>
 
@@ -106,7 +107,10 @@ void AddBake(CLI::App* app, CommandLine* line) {
   CLI::App* command =
       app->add_subcommand("bake", "Bake PBR texture sets and measured BRDFs into containers");
   BakeOptions& o = line->bake;
-  command->add_option("INPUT", o.inputs, "Folders of maps, BRDF files, folders of both, job files")
+  command
+      ->add_option("INPUT", o.inputs,
+                   "Folders of maps, BRDF files, scenes (.gltf, .glb, .patina.json), folders of "
+                   "these, job files")
       ->required();
   AddOverride(command, "-o,--out", &o.job.out,
               "Folder for the containers (needed unless every INPUT is a job file)")
@@ -177,6 +181,35 @@ void AddBake(CLI::App* app, CommandLine* line) {
   command->add_flag("--no-toksvig", o.job.no_toksvig,
                     "[maps] Do not raise the roughness of coarser mips by the variance of the "
                     "normals they average");
+  command
+      ->add_option(
+          "--material", o.materials,
+          "[scenes] Bake only this material: its name, or # and its index where others have the "
+          "same; may be repeated")
+      ->type_name("NAME");
+  command->add_flag("--learn-all", o.job.learn_all,
+                    "[maps] Learn every channel and mip there is, constant and unused ones too");
+  std::vector<std::string> effects(EffectNames().begin(), EffectNames().end());
+  command
+      ->add_option("--effect-off", o.job.effects_off,
+                   "[maps] Turn one way of saving work off; may be repeated")
+      ->check(CLI::IsMember(effects));
+  AddOverride(command, "--constant-tolerance", &o.job.constant_tolerance,
+              "[maps] Store a channel as a number if it is that near to it everywhere (default "
+              "half an 8-bit code, 0.00196)")
+      ->check(FiniteRange(0.0, 1.0))
+      ->type_name("X");
+  command
+      ->add_option_function<std::vector<int>>(
+          "--lod-range",
+          [&o](const std::vector<int>& mips) {
+            o.job.lod_range = {std::min(mips[0], mips[1]), std::max(mips[0], mips[1])};
+          },
+          "[maps] Bake only the mips from one to the other: what is looked at")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(0, 31))
+      ->type_name("MIP,MIP");
   AddCommon(command, line, true);
   command->footer(kBakeFooter);
   command->callback([line] { line->command = Command::kBake; });
@@ -325,10 +358,12 @@ void AddSample(CLI::App* app, CommandLine* line) {
   SampleOptions& o = line->sample;
   command->add_option("-o,--out", o.out, "Folder for the files")->required()->type_name("DIR");
   command
-      ->add_option("--kind", o.kind,
-                   "material: maps and a job.json; brdf: BRDF files of every format, 200 MB; all "
-                   "(default): the material, and two small BRDF files in DIR/brdf")
-      ->check(CLI::IsMember({"all", "material", "brdf"}));
+      ->add_option(
+          "--kind", o.kind,
+          "material: maps and a job.json; brdf: BRDF files of every format, 200 MB; scene: a "
+          "glTF scene and a scene file; all "
+          "(default): the material, and two small BRDF files in DIR/brdf")
+      ->check(CLI::IsMember({"all", "material", "brdf", "scene"}));
   command->add_option("--size", o.size, "Texels a side of the maps (default 1024)")
       ->check(CLI::Range(1, kMaxSampleSide))
       ->type_name("N");
@@ -346,7 +381,9 @@ void AddSample(CLI::App* app, CommandLine* line) {
       "  patina sample --out sample --size 512\n"
       "  patina run sample/job.json\n"
       "  patina sample --kind brdf --out brdfs\n"
-      "  patina bake brdfs --out baked");
+      "  patina bake brdfs --out baked\n"
+      "  patina sample --kind scene --out scene\n"
+      "  patina bake scene/mosaic.gltf --out baked");
   command->callback([line] { line->command = Command::kSample; });
 }
 

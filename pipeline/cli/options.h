@@ -32,12 +32,17 @@ struct JobOverrides {
   std::optional<std::string> ocio;
   bool repair_nonfinite = false;
   bool no_toksvig = false;
+  bool learn_all = false;
+  std::vector<std::string> effects_off;
+  std::optional<double> constant_tolerance;
+  std::optional<std::vector<int>> lod_range;  // two
 };
 
 struct BakeOptions {
-  std::vector<std::string> inputs;  // folders, BRDF files, job files
-  std::string map_list;             // --maps FILE.json, or empty
-  int share = 1;                    // BRDFs on one codebook
+  std::vector<std::string> inputs;     // folders, BRDF files, job files
+  std::string map_list;                // --maps FILE.json, or empty
+  int share = 1;                       // BRDFs on one codebook
+  std::vector<std::string> materials;  // of scenes: only these; empty: all
   JobOverrides job;
 };
 
@@ -77,7 +82,7 @@ struct EvalOptions {
 
 struct SampleOptions {
   std::string out;
-  std::string kind = "all";  // "all", "material", "brdf"
+  std::string kind = "all";  // "all", "material", "brdf", "scene"
   int size = 1024;
   uint64_t seed = 1;
 };

@@ -34,6 +34,7 @@ PlannedSubmit Plan(Job job, const SubmitSettings& settings) {
   }
   job.file = Absolute(job.file);
   job.folder = Absolute(job.folder);
+  job.scene = Absolute(job.scene);
   job.out = Absolute(settings.out.empty() ? job.out : settings.out);
   Json described = Json::parse(JobToJson(job), nullptr, false);
   if (job.out.empty()) described.erase("out");

@@ -33,12 +33,24 @@ Result<Comparison> CompareContainer(const std::string& container, const Job& sou
                     ": only materials are compared with maps; `patina info` tells "
                     "how good a BRDF is, and `patina eval` gives its values");
   }
+  if (!source.scene.empty()) {
+    return Fail(ErrorCode::kUnsupported,
+                opened.directory +
+                    ": it is not compared with a scene; `patina info` tells how good "
+                    "it is");
+  }
   PATINA_TRY(VerifyPayloads(opened));
   Job job = source;
   job.address =
       opened.manifest.source.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
   job.working_space =
       ParseWorkingSpace(opened.manifest.working_space).value_or(WorkingSpace::kLinearRec709);
+  // What the container has no mips or channels for is not compared.
+  job.lod_range = opened.manifest.lod_range;
+  // Against every sample, those included that count as constant.
+  job.effects = EffectSwitches();
+  job.effects.constant_tolerance = 0;
+  job.effects.equal = job.effects.unused = false;
   PATINA_ASSIGN(const MapSet set, MapsOfJob(job));
   PATINA_ASSIGN(const JobSource read, ReadSource(job, set, pool, cancel, progress));
   for (const ReferenceMap& map : read.reference.maps) {

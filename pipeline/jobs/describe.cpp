@@ -41,6 +41,49 @@ std::string MapLine(const Manifest& manifest, const ManifestMapQuality& quality)
   return line + "\n";
 }
 
+std::string Numbers(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += Format(" %.6g", value);
+  return text;
+}
+
+std::string SceneText(const Manifest& manifest) {
+  if (!manifest.scene) return "";
+  const SceneLook& look = *manifest.scene;
+  std::string text = "\nScene\n  " + look.file + ", material " + std::to_string(look.index) +
+                     " \"" + look.material + "\", alpha " + look.alpha_mode;
+  if (look.alpha_mode == "mask") text += Format(" at %.4g", look.alpha_cutoff);
+  text +=
+      std::string(look.double_sided ? ", double-sided" : "") + (look.unlit ? ", unlit" : "") + "\n";
+  for (const SceneValue& factor : look.factors)
+    text += "  factor of " + factor.map + Numbers(factor.value) + "\n";
+  for (const SceneValue& parameter : look.parameters)
+    text += "  " + parameter.map + Numbers(parameter.value) + "\n";
+  return text;
+}
+
+// What was not learned, and what that saved.
+std::string EffectsText(const Manifest& manifest) {
+  std::string text;
+  for (const ManifestEffect& effect : manifest.effects) {
+    if (effect.state == "learned") continue;
+    text += Format("  %-22s%-9s %s", effect.what.c_str(),
+                   effect.state == "left_out" ? "left out" : effect.state.c_str(),
+                   effect.reason.c_str());
+    if (effect.saved) {
+      text += Format("; saves %llu bytes, %llu multiply-adds a lookup",
+                     static_cast<unsigned long long>(effect.saved->bytes),
+                     static_cast<unsigned long long>(effect.saved->decode_multiply_adds));
+    }
+    text += "\n";
+  }
+  if (manifest.lod_range) {
+    text +=
+        Format("  mips %d to %d are stored\n", (*manifest.lod_range)[0], (*manifest.lod_range)[1]);
+  }
+  return text.empty() ? "" : "\nNot learned\n" + text;
+}
+
 std::string Measure(const char* name, const std::optional<double>& value) {
   return value ? Format("  %-24s%.6f\n", name, *value) : "";
 }
@@ -124,6 +167,7 @@ std::string ContainerText(const Container& container) {
       text +=
           Format("  %-18s", map.role.c_str()) + map.color_space + " (by " + map.color_rule + ")\n";
   }
+  text += SceneText(m) + EffectsText(m);
   text += "\nFiles\n";
   for (const ManifestPayload& payload : m.payloads) {
     text += Format("  %-18s%12llu bytes  %s", payload.name.c_str(),

@@ -1,9 +1,11 @@
 #include "pipeline/jobs/ingest.h"
 
+#include <bit>
 #include <map>
 
 #include "formats/base/names.h"
 #include "formats/base/sha256.h"
+#include "formats/scene/scene_json.h"
 
 namespace patina {
 namespace {
@@ -21,12 +23,37 @@ Result<std::map<std::string, std::string>> HashFiles(const std::vector<std::stri
   return hashes;
 }
 
+// What of a scene decides bytes, for the fingerprint; empty without one.
+std::string SceneText(const JobMaps& maps) {
+  if (!maps.scene) return "";
+  std::string text =
+      "scene " +
+      SceneLookToJson(*maps.scene).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  text += maps.address == AddressMode::kClamp ? " clamp" : " wrap";
+  for (const ConstantMap& constant : maps.constants) {
+    text += " " + constant.role;
+    for (const float value : constant.value)
+      text += " " + std::to_string(std::bit_cast<uint32_t>(value));
+  }
+  for (const Effect& effect : maps.left_out) text += " without " + effect.what;
+  if (maps.lod_range)
+    text += " mips " + std::to_string((*maps.lod_range)[0]) + " " +
+            std::to_string((*maps.lod_range)[1]);
+  if (maps.density) {
+    for (const double value :
+         {maps.density->uv_size_m, maps.density->min_pixels_per_m, maps.density->max_pixels_per_m})
+      text += " " + std::to_string(std::bit_cast<uint64_t>(value));
+  }
+  return text + "\n";
+}
+
 }  // namespace
 
-Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool,
-                             const CancelToken& cancel, ProgressSink& progress) {
+Result<JobSource> ReadSource(const Job& job, const JobMaps& maps, ThreadPool& pool,
+                             const CancelToken& cancel, ProgressSink& progress,
+                             SharedImages* images) {
   ReferenceOptions options;
-  options.address = job.address;
+  options.address = maps.address.value_or(job.address);
   options.normal_convention =
       ParseNormalConvention(job.normal_convention).value_or(NormalConvention::kAuto);
   options.repair_nonfinite = job.repair_nonfinite;
@@ -35,15 +62,31 @@ Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool
   auto config = ColorConfig::Load(job.ocio);
   if (!config) return Fail(std::move(config).error(), "/ocio");
   options.color = {job.working_space, *config, job.color_space};
+  options.opacity_cutoff = maps.opacity_cutoff;
+  options.constants = maps.constants;
+  options.effects = job.effects;
+  options.lod_range = job.lod_range ? job.lod_range : maps.lod_range;
+  if (!job.lod_range) options.density = maps.density;
+  for (const std::string& warning : maps.warnings) progress.OnWarning(warning);
 
   // Hashed before and after reading: a file that is still being copied must not get a container
   // under a wrong name.
   std::vector<std::string> paths;
-  for (const MapSource& map : set.maps) paths.push_back(map.path);
+  for (const MapSource& map : maps.set.maps) paths.push_back(map.path);
   PATINA_ASSIGN(const auto before, HashFiles(paths, cancel));
+  if (images != nullptr) {
+    options.read_image = [&](const std::string& path) {
+      return images->Read(before.at(path), path);
+    };
+  }
   JobSource source;
   source.color_config = *config;
-  PATINA_ASSIGN(source.reference, BuildReference(set, options, pool, progress));
+  source.scene = maps.scene;
+  PATINA_ASSIGN(source.reference, BuildReference(maps.set, options, pool, progress));
+  std::vector<std::string>& warnings = source.reference.warnings;
+  warnings.insert(warnings.begin(), maps.warnings.begin(), maps.warnings.end());
+  std::vector<Effect>& effects = source.reference.effects;
+  effects.insert(effects.end(), maps.left_out.begin(), maps.left_out.end());
   PATINA_ASSIGN(const auto after, HashFiles(paths, cancel));
   for (const auto& [path, hash] : after) {
     if (before.at(path) != hash) {
@@ -58,11 +101,12 @@ Result<JobSource> ReadSource(const Job& job, const MapSet& set, ThreadPool& pool
     }
     source.sha256.push_back(found->second);
   }
-  source.fingerprint = FingerprintOf(job, source.reference, source.color_config, source.sha256);
+  source.fingerprint =
+      FingerprintOf(job, maps, source.reference, source.color_config, source.sha256);
   return source;
 }
 
-std::string FingerprintOf(const Job& job, const SourceReference& reference,
+std::string FingerprintOf(const Job& job, const JobMaps& maps, const SourceReference& reference,
                           const ColorConfig& color_config, const std::vector<std::string>& sha256) {
   Sha256 hash;
   bool converted = false;
@@ -84,6 +128,7 @@ std::string FingerprintOf(const Job& job, const SourceReference& reference,
   }
   if (converted || color_config.source() != ConfigSource::kBuiltin)
     hash.Update("colors " + color_config.sha256() + "\n");
+  hash.Update(SceneText(maps));
   return hash.FinishHex();
 }
 

@@ -15,6 +15,8 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr uint64_t kMaxLod = 31;
+
 std::string Shown(const Json& value) {
   constexpr size_t kLongest = 60;
   std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
@@ -246,13 +248,67 @@ void AssignEnum(const std::string& name, Parse parse, Enum* out) {
   if (auto value = parse(name)) *out = *value;
 }
 
+// What is baked: a folder, a list of maps, or a material of a scene.
+void ReadSceneFields(ObjectReader* reader, Job* job) {
+  const bool folder = reader->Find("folder") != nullptr, maps = reader->Find("maps") != nullptr;
+  const bool material = reader->Find("material") != nullptr;
+  if (reader->Find("scene") == nullptr) {
+    if (!folder && !maps)
+      reader->Complain("folder", "is missing: give \"folder\", \"maps\" or \"scene\"");
+    if (material) reader->Complain("material", "belongs to \"scene\", which is missing");
+    return;
+  }
+  if (!material) reader->Complain("material", "is missing: name the material of the scene");
+  if (folder || maps || !job->set.empty()) {
+    reader->Complain("scene",
+                     "says which maps there are: leave out \"folder\", \"maps\" and \"set\"");
+  }
+}
+
+void ReadEffects(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+  if (const Json* effects = reader->Find("effects")) {
+    if (!effects->is_object()) {
+      reader->Complain("effects", "must be an object; is " + Shown(*effects));
+    } else {
+      ObjectReader inner(*effects, "/effects", problems);
+      for (const char* name : EffectNames()) inner.Flag(name, EffectSwitch(&job->effects, name));
+      inner.RefuseUnknown();
+    }
+  }
+  reader->Number("constant_tolerance", 1, &job->effects.constant_tolerance);
+  const Json* range = reader->Find("lod_range");
+  if (range == nullptr) return;
+  const auto mip = [&](size_t i) {
+    return range->is_array() && range->size() == 2 && (*range)[i].is_number_unsigned()
+               ? (*range)[i].get<uint64_t>()
+               : kMaxLod + 1;
+  };
+  if (mip(0) > kMaxLod || mip(1) > kMaxLod || mip(0) > mip(1)) {
+    return reader->Complain("lod_range", "must be two mips, 0 to " + std::to_string(kMaxLod) +
+                                             ", the smaller one first; is " + Shown(*range));
+  }
+  job->lod_range = {static_cast<int>(mip(0)), static_cast<int>(mip(1))};
+}
+
+// Fields of this kind that are not their defaults.
+void EffectsToJson(const Job& job, nlohmann::ordered_json* json) {
+  EffectSwitches switches = job.effects;
+  for (const char* name : EffectNames()) {
+    if (!*EffectSwitch(&switches, name)) (*json)["effects"][name] = false;
+  }
+  if (switches.constant_tolerance != kDefaultConstantTolerance)
+    (*json)["constant_tolerance"] = switches.constant_tolerance;
+  if (job.lod_range) (*json)["lod_range"] = *job.lod_range;
+}
+
 void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
   reader->Text("folder", false, 4096, &job->folder);
   reader->Text("set", false, 255, &job->set);
   const Json* maps = reader->Find("maps");
   if (maps != nullptr) job->maps = ReadMaps(*maps, "/maps", problems);
-  if (reader->Find("folder") == nullptr && maps == nullptr)
-    reader->Complain("folder", "is missing: give \"folder\" or \"maps\"");
+  reader->Text("scene", false, 4096, &job->scene);
+  reader->Text("material", false, 255, &job->scene_material);
+  ReadSceneFields(reader, job);
   std::string profile, address;
   reader->Choice("profile", {"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
   reader->Choice("address", {"wrap", "clamp"}, &address);
@@ -267,19 +323,22 @@ void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems
   reader->Choice("working_space", {"lin_rec709", "acescg"}, &working_space);
   reader->Text("color_space", false, kMaxColorSpaceName, &job->color_space);
   reader->Text("ocio", false, 4096, &job->ocio);
+  ReadEffects(reader, problems, job);
   for (const char* key : {"file", "model"})
     reader->Refuse(key, "is a field of jobs of kind \"brdf\"; this job's kind is \"material\"");
   AssignEnum(profile, ParseProfile, &job->profile);
   AssignEnum(working_space, ParseWorkingSpace, &job->working_space);
+  job->address_given = !address.empty();
   if (address == "clamp") job->address = AddressMode::kClamp;
 }
 
 void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
   reader->Text("file", true, 4096, &job->file);
   if (const Json* model = reader->Find("model")) job->model = ReadModel(*model, problems);
-  for (const char* key : {"folder", "set", "maps", "profile", "address", "normal_convention",
-                          "target_psnr_db", "time_budget_s", "samples", "min_psnr_db",
-                          "repair_nonfinite", "toksvig", "working_space", "color_space", "ocio"}) {
+  for (const char* key :
+       {"folder", "set", "maps", "scene", "material", "effects", "constant_tolerance", "lod_range",
+        "profile", "address", "normal_convention", "target_psnr_db", "time_budget_s", "samples",
+        "min_psnr_db", "repair_nonfinite", "toksvig", "working_space", "color_space", "ocio"}) {
     reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"brdf\"");
   }
 }
@@ -421,6 +480,7 @@ Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
   AssignEnum(recipe, ParseRecipe, &job.recipe);
   job.file = Join(base_folder, job.file);
   job.folder = Join(base_folder, job.folder);
+  job.scene = Join(base_folder, job.scene);
   job.out = Join(base_folder, job.out);
   job.ocio = Join(base_folder, job.ocio);
   job.maps_folder = job.folder.empty() ? base_folder : job.folder;
@@ -450,6 +510,8 @@ std::string JobToJson(const Job& job) {
   if (job.kind == JobKind::kBrdf) return BrdfJobToJson(job, std::move(json));
   if (!job.folder.empty()) json["folder"] = job.folder;
   if (!job.set.empty()) json["set"] = job.set;
+  if (!job.scene.empty()) json["scene"] = job.scene;
+  if (!job.scene_material.empty()) json["material"] = job.scene_material;
   for (const JobMap& map : job.maps) {
     nlohmann::ordered_json entry;
     entry["role"] = map.role;
@@ -470,7 +532,8 @@ std::string JobToJson(const Job& job) {
   if (job.time_budget_s > 0) json["time_budget_s"] = job.time_budget_s;
   if (job.samples > 0) json["samples"] = job.samples;
   if (job.min_psnr_db > 0) json["min_psnr_db"] = job.min_psnr_db;
-  if (job.address != defaults.address) json["address"] = AddressModeName(job.address);
+  if (job.address != defaults.address || (job.address_given && !job.scene.empty()))
+    json["address"] = AddressModeName(job.address);
   if (job.normal_convention != defaults.normal_convention)
     json["normal_convention"] = job.normal_convention;
   if (job.repair_nonfinite) json["repair_nonfinite"] = true;
@@ -479,6 +542,7 @@ std::string JobToJson(const Job& job) {
     json["working_space"] = WorkingSpaceName(job.working_space);
   if (job.color_space != defaults.color_space) json["color_space"] = job.color_space;
   if (!job.ocio.empty()) json["ocio"] = job.ocio;
+  EffectsToJson(job, &json);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -511,6 +575,7 @@ std::string CanonicalJob(const Job& job) {
   if (job.working_space != WorkingSpace::kLinearRec709)
     json["working_space"] = WorkingSpaceName(job.working_space);
   if (job.color_space != "auto") json["color_space"] = job.color_space;
+  EffectsToJson(job, &json);
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 

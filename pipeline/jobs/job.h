@@ -1,6 +1,7 @@
 // A job: everything that decides what one bake makes. Described by schemas/job.schema.json.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "formats/base/result.h"
 #include "pipeline/color/primaries.h"
+#include "pipeline/effects/effects.h"
 #include "pipeline/material/target_pyramid.h"
 #include "pipeline/material/train.h"
 
@@ -55,8 +57,11 @@ struct Job {
   std::string file;    // [brdf] the table or list of measurements
   JobModel model;      // [brdf]
   std::string folder;  // [material] of the maps; may be empty when `maps` is not
-  std::string set;  // [material] name of the one meant when `folder` holds several materials; may
-                    // be empty when it does not
+  std::string set;    // [material] name of the one meant when `folder` holds several materials; may
+                      // be empty when it does not
+  std::string scene;  // [material] a scene's file, in place of folder and maps
+  std::string
+      scene_material;        // [material] with `scene`: name of the one meant, or "#" and its index
   std::vector<JobMap> maps;  // [material] empty: found by file name in `folder`
   std::string maps_folder;  // [material] what files of `maps` are relative to: `folder`, or the job
                             // file's folder
@@ -72,7 +77,10 @@ struct Job {
   double samples = 0;         // 0: by quality and size
   double min_psnr_db = 0;     // 0: no gate
   AddressMode address = AddressMode::kWrap;
-  std::string normal_convention = "auto";  // "auto", "opengl", "directx"
+  bool address_given = false;  // not given: of a scene the material's samplers decide
+  EffectSwitches effects;
+  std::optional<std::array<int, 2>> lod_range;  // the mips that are looked at; absent: all
+  std::string normal_convention = "auto";       // "auto", "opengl", "directx"
   bool repair_nonfinite = false;
   bool toksvig = true;
   WorkingSpace working_space = WorkingSpace::kLinearRec709;

@@ -7,6 +7,7 @@
 #include "pipeline/image/map_name.h"
 #include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/job_sets.h"
+#include "pipeline/jobs/scene_job.h"
 
 namespace patina {
 namespace {
@@ -27,6 +28,13 @@ bool IsBrdf(const std::string& path) {
 PlannedJob Plan(const FoundAsset& found) {
   if (!found.problem.empty()) return {found.asset, Fail(found.problem_code, found.problem)};
   if (!found.file.empty()) return PlanBrdf(found.asset, found.file);
+  if (!found.scene.empty()) {
+    Job job;
+    job.asset = found.asset;
+    job.scene = found.scene;
+    job.scene_material = found.scene_material;
+    return {found.asset, std::move(job)};
+  }
   Job job;
   job.asset = found.asset;
   job.folder = found.folder;
@@ -40,6 +48,16 @@ JobPlan PlanJobs(const std::string& input, const std::string& except) {
   JobPlan plan;
   std::error_code ignored;
   if (std::filesystem::is_regular_file(input, ignored)) {
+    if (IsSceneFileName(input)) {
+      auto jobs = JobsOfScene(input);
+      if (!jobs) plan.jobs.push_back({AssetNameFromPath(input), Fail(jobs.error())});
+      if (!jobs) return plan;
+      for (Job& job : *jobs) {
+        const std::string asset = job.asset;
+        plan.jobs.push_back({asset, std::move(job)});
+      }
+      return plan;
+    }
     if (IsBrdf(input)) {
       plan.jobs.push_back(PlanBrdf(BrdfAssetName(input), input));
       return plan;

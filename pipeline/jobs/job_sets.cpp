@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include "pipeline/image/map_name.h"
 #include "pipeline/jobs/brdf_files.h"
+#include "pipeline/jobs/scene_job.h"
 
 namespace patina {
 namespace {
@@ -74,6 +76,42 @@ void AddBrdfs(const std::string& folder, const std::vector<std::string>& files, 
   }
 }
 
+// Texture sets that no scene has claimed.
+void DropClaimed(const std::set<std::string>& claimed, std::vector<MapSet>* sets) {
+  std::error_code ignored;
+  std::erase_if(*sets, [&](const MapSet& set) {
+    return std::any_of(set.maps.begin(), set.maps.end(), [&](const MapSource& map) {
+      return claimed.count(fs::weakly_canonical(map.path, ignored).string()) != 0;
+    });
+  });
+}
+
+// Adds the materials of the scenes of a folder, and the files that belong to them.
+void AddScenes(const std::string& folder, FoundAssets* found, std::set<std::string>* claimed) {
+  for (const std::string& path : FindSceneFiles(folder)) {
+    auto scene = ReadScene(path);
+    if (!scene) {
+      FoundAsset asset;
+      asset.asset = AssetNameFromPath(path);
+      asset.folder = folder;
+      asset.problem = scene.error().message;
+      asset.problem_code = scene.error().code;
+      found->assets.push_back(std::move(asset));
+      continue;
+    }
+    const std::vector<std::string> files = FilesOfScene(*scene);
+    claimed->insert(files.begin(), files.end());
+    for (const SceneMaterial& material : scene->materials) {
+      FoundAsset asset;
+      asset.asset = material.asset;
+      asset.folder = folder;
+      asset.scene = path;
+      asset.scene_material = SceneMaterialKey(*scene, material);
+      found->assets.push_back(std::move(asset));
+    }
+  }
+}
+
 std::string Names(const std::vector<MapSet>& sets) {
   std::string names;
   for (const MapSet& set : sets) names += (names.empty() ? "" : ", ") + set.name;
@@ -138,13 +176,18 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
   }
   FoundAssets found;
   PATINA_ASSIGN(const std::vector<std::string> brdfs, FindBrdfFiles(folder));
+  std::set<std::string> claimed;
+  AddScenes(folder, &found, &claimed);
+  const bool has_scenes = !found.assets.empty();
   auto sets = FindMaps(folder);
-  if (sets) {
+  if (sets) DropClaimed(claimed, &*sets);
+  if (sets && !sets->empty()) {
     AddSets(folder, *sets, &found);
     AddBrdfs(folder, brdfs, 0, &found);
     return found;
   }
-  if (sets.error().code != ErrorCode::kNotFound) {
+  // Beside a scene, images that are no sets are its textures.
+  if (!has_scenes && sets.error().code != ErrorCode::kNotFound) {
     if (brdfs.empty()) return Fail(sets.error());
     AddProblem(folder, sets.error(), &found);
     AddBrdfs(folder, brdfs, 0, &found);
@@ -158,10 +201,13 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
     const size_t first = found.assets.size();
     auto inner_brdfs = FindBrdfFiles(subfolder);
     const std::vector<std::string> files = inner_brdfs ? *inner_brdfs : std::vector<std::string>();
+    AddScenes(subfolder, &found, &claimed);
+    const bool inner_scenes = found.assets.size() > first;
     auto inner = FindMaps(subfolder);
     if (inner) {
+      DropClaimed(claimed, &*inner);
       AddSets(subfolder, *inner, &found);
-    } else {
+    } else if (!inner_scenes) {
       auto listed = ListFolder(subfolder);
       const bool no_images = listed && !listed->has_images;
       if (no_images && files.empty()) {
@@ -174,7 +220,7 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
     }
     AddBrdfs(subfolder, files, first, &found);
   }
-  if (found.assets.empty()) return Fail(sets.error());
+  if (found.assets.empty() && !sets) return Fail(sets.error());
   return found;
 }
 

@@ -12,6 +12,7 @@
 #include "pipeline/jobs/package.h"
 #include "pipeline/jobs/preview.h"
 #include "pipeline/jobs/report.h"
+#include "pipeline/jobs/scene_maps.h"
 #include "pipeline/jobs/staged_run.h"
 
 namespace patina {
@@ -49,13 +50,28 @@ class MaterialRun : public StagedRun {
   Status Ingest() {
     PATINA_TRY(ChooseSimdTarget());
     reading_input_ = true;
-    PATINA_ASSIGN(set_, MapsOfJob(job_));
+    if (job_.scene.empty()) {
+      PATINA_ASSIGN(maps_, MapsOfJob(job_));
+      reading_input_ = false;
+      return OpenStaging();
+    }
+    PATINA_ASSIGN(const SceneChoice choice, SceneOfJob(job_));
     reading_input_ = false;
-    return OpenStaging();
+    PATINA_TRY(OpenStaging());
+    reading_input_ = true;
+    PATINA_ASSIGN(maps_, MapsOfScene(job_, choice, ScratchFolder()));
+    reading_input_ = false;
+    return {};
   }
 
+  // For images that lie inside other files; gone before anything is published.
+  std::string ScratchFolder() const { return staging_->directory() + "/source"; }
+
   Status BuildSource() {
-    PATINA_ASSIGN(source_, ReadSource(job_, set_, *pool_, cancel_, sink_));
+    PATINA_ASSIGN(source_, ReadSource(job_, maps_, *pool_, cancel_, sink_, guards_.images));
+    std::error_code error;
+    std::filesystem::remove_all(ScratchFolder(), error);
+    if (error) return FailErrno(error.value(), "cannot remove", ScratchFolder());
     result_.fingerprint = source_.fingerprint;
     for (const MapNote& note : source_.reference.notes) {
       observer_.OnNote(MapNoteKindName(note.kind), note.file + ": " + note.text);
@@ -82,8 +98,13 @@ class MaterialRun : public StagedRun {
                            static_cast<double>(material.channels.size()) / pool_->threads();
       options.time_budget_s = std::max(0.1, job_.time_budget_s - SecondsSoFar() - later);
     }
-    const ModelShape shape =
-        ShapeForProfile(job_.profile, source_.reference.width, source_.reference.height);
+    const std::vector<TargetLevel>& mips = material.pyramid.levels;
+    ModelShape shape = ShapeForProfile(job_.profile, mips[0].width, mips[0].height);
+    // Levels that only coarser mips would read are not stored.
+    for (FeatureShape& feature : shape) {
+      const int read = static_cast<int>(mips.size()) - feature.lod_shift;
+      feature.levels = std::clamp(read, 1, feature.levels);
+    }
     PATINA_ASSIGN(TrainedMaterial model, TrainMaterial(material, shape, options, *pool_, sink_));
     result_.samples = model.samples;
     result_.stopped_by = model.stopped_by;
@@ -164,7 +185,7 @@ class MaterialRun : public StagedRun {
     return curve;
   }
 
-  MapSet set_;
+  JobMaps maps_;
   JobSource source_;
   std::optional<TrainedMaterial> model_;
   Measurement measurement_;

@@ -216,8 +216,9 @@ Result<Measurement> MeasureContainer(const std::string& directory,
   std::string problem;
   PATINA_TRY(DecoderStatus(Decoder::Load(directory, &decoder, &problem), problem));
   const std::vector<TargetLevel>& levels = reference.pyramid.levels;
-  if (static_cast<int>(levels.size()) != decoder.levels() || levels[0].width != decoder.width() ||
-      levels[0].height != decoder.height()) {
+  const int first = reference.pyramid.first_mip;
+  if (first + static_cast<int>(levels.size()) > decoder.levels() ||
+      levels[0].width != decoder.MipWidth(first) || levels[0].height != decoder.MipHeight(first)) {
     return Fail(ErrorCode::kConflict,
                 directory + ": it is for " + std::to_string(decoder.width()) + " x " +
                     std::to_string(decoder.height()) + " texels, the source has " +
@@ -232,9 +233,10 @@ Result<Measurement> MeasureContainer(const std::string& directory,
   double done = 0;
   for (size_t i = 0; i < levels.size(); ++i) {
     if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
-    planes.Load(decoder, levels[i], static_cast<int>(i), pool);
+    planes.Load(decoder, levels[i], first + static_cast<int>(i), pool);
     if (!planes.finite()) {
-      return Fail(ErrorCode::kInternal, directory + ": mip " + std::to_string(i) +
+      return Fail(ErrorCode::kInternal, directory + ": mip " +
+                                            std::to_string(first + static_cast<int>(i)) +
                                             " decodes to a value that is not finite");
     }
     planes.Scale(layout.channels, pool);

@@ -6,6 +6,7 @@
 #include "formats/base/names.h"
 #include "formats/dds.h"
 #include "formats/weights.h"
+#include "pipeline/jobs/effect_costs.h"
 
 namespace patina {
 namespace {
@@ -14,33 +15,13 @@ constexpr const char* kWeightsName = "decoder.weights";
 
 std::string FeatureName(int texture) { return "features_" + std::to_string(texture) + ".dds"; }
 
-std::string Shortest(float value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", static_cast<double>(value));
-  return text;
-}
-
-// Maps that are numbers need no network output.
-std::vector<ManifestLeftOut> LeftOut(const std::vector<TargetChannel>& channels) {
-  std::vector<ManifestLeftOut> left_out;
-  for (const TargetChannel& channel : channels) {
-    if (!channel.constant) continue;
-    ManifestLeftOut entry;
-    entry.what = channel.component.empty() ? channel.map : channel.map + "." + channel.component;
-    entry.reason = "constant " + Shortest(channel.constant_value);
-    entry.saved = "1 network output";
-    left_out.push_back(std::move(entry));
-  }
-  return left_out;
-}
-
-ManifestSource DescribeSource(const Job& job, const JobSource& source) {
+ManifestSource DescribeSource(const JobSource& source) {
   const SourceReference& reference = source.reference;
   ManifestSource described;
   described.width = reference.width;
   described.height = reference.height;
   described.levels = DdsFullChainLevels(reference.width, reference.height);
-  described.address = AddressModeName(job.address);
+  described.address = AddressModeName(reference.material.pyramid.address);
   for (const ReferenceMap& map : reference.maps) {
     if (map.convention != NormalConvention::kAuto && map.role == "normal") {
       described.normal_convention = NormalConventionName(map.convention);
@@ -62,11 +43,11 @@ ManifestSource DescribeSource(const Job& job, const JobSource& source) {
   return described;
 }
 
-void DescribeModel(const TrainedMaterial& model, Manifest* manifest) {
+void DescribeModel(const TrainedMaterial& model, int first_mip, Manifest* manifest) {
   for (int t = 0; t < kFeatureTextures; ++t) {
     const FeatureShape& shape = model.shape[static_cast<size_t>(t)];
-    manifest->features.push_back(
-        {FeatureName(t), shape.width, shape.height, shape.levels, -shape.lod_shift, "BC6H_UF16"});
+    manifest->features.push_back({FeatureName(t), shape.width, shape.height, shape.levels,
+                                  -shape.lod_shift - first_mip, "BC6H_UF16"});
   }
   ManifestNetwork network;
   network.payload = kWeightsName;
@@ -139,9 +120,10 @@ Manifest DescribeContainer(const Job& job, const JobSource& source, const Traine
   manifest.seed = job.seed;
   manifest.profile = ProfileName(job.profile);
   manifest.quality_setting = QualityName(job.quality);
-  manifest.source = DescribeSource(job, source);
+  manifest.source = DescribeSource(source);
   manifest.training.stopped_by = "none";
-  if (model != nullptr) DescribeModel(*model, &manifest);
+  if (model != nullptr)
+    DescribeModel(*model, source.reference.material.pyramid.first_mip, &manifest);
   for (const TargetChannel& channel : source.reference.material.channels) {
     ManifestChannel entry;
     entry.map = channel.map;
@@ -172,7 +154,9 @@ Manifest DescribeContainer(const Job& job, const JobSource& source, const Traine
       ConfigSourceName(config.source()),
       config.file().empty() ? "" : ManifestPath(std::filesystem::path(config.file()).filename()),
       config.sha256()};
-  manifest.left_out = LeftOut(source.reference.material.channels);
+  manifest.scene = source.scene;
+  manifest.lod_range = source.reference.lod_range;
+  manifest.effects = DescribeEffects(job, source.reference, model);
   manifest.warnings = source.reference.warnings;
   return manifest;
 }

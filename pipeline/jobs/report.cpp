@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "formats/manifest_json.h"
+
 namespace patina {
 namespace {
 
@@ -89,6 +91,7 @@ std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPay
     if (channel.output < 0) entry["constant"] = channel.constant;
     json["channels"].push_back(std::move(entry));
   }
+  json["effects"] = EffectsToJson(manifest.effects);
   json["quality"] = QualityJson(measurement);
   if (model != nullptr) json["training"] = TrainingJson(*model);
   json["bytes"] = Json::object();

@@ -8,6 +8,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/base/result.h"
+#include "pipeline/image/shared_images.h"
 
 namespace patina {
 
@@ -21,6 +22,8 @@ struct RunGuards {
   // The fence of the job and the attempt that this run is. Empty: none.
   std::string fence_file;
   int64_t attempt = 0;
+  // Of several runs in one process that may read the same files; not owned. Null: none.
+  SharedImages* images = nullptr;
 };
 
 // A fence is a file that holds the number of a job's current attempt. Who publishes holds a shared

@@ -37,9 +37,9 @@ StagedRun::StagedRun(const Job& job, JobObserver& observer, const CancelToken& c
       observer_(observer),
       cancel_(cancel),
       sink_(observer, &result_.warnings),
+      guards_(guards),
       start_(Clock::now()),
-      start_cpu_(ProcessCpuSeconds()),
-      guards_(guards) {}
+      start_cpu_(ProcessCpuSeconds()) {}
 
 JobResult StagedRun::Run() {
   ResetPeakMemory();

@@ -84,6 +84,7 @@ class StagedRun {
   std::optional<StagingArea> staging_;
   std::optional<ThreadPool> pool_;
   Manifest manifest_;
+  RunGuards guards_;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -93,7 +94,6 @@ class StagedRun {
   std::string stage_;
   std::vector<StageCost> stages_;
   SimdTarget simd_ = SimdTarget::kAvx2;
-  RunGuards guards_;
   std::optional<FenceHold> fence_;
 };
 

@@ -50,11 +50,11 @@ void SymmetricEigen(int n, std::vector<double>* matrix, std::vector<double>* vec
 }  // namespace
 
 std::vector<float> ChannelWeights(const MaterialReference& reference) {
-  std::vector<float> weight(reference.pyramid.channels, 1.0f);
+  std::vector<float> weight(reference.pyramid.channels, 0.0f);
   for (const TargetChannel& channel : reference.channels) {
     if (channel.learned_index < 0) continue;
     const float range = std::max(1.0f, channel.max_value - channel.min_value);
-    weight[channel.learned_index] = 1.0f / (range * range);
+    weight[channel.learned_index] += 1.0f / (range * range);
   }
   return weight;
 }

@@ -19,7 +19,7 @@ struct ChannelStats {
 };
 
 // Weight of each channel's squared error: 1 for channels whose range is at most 1, else 1 / range^2, so that an HDR channel
-// does not drown the others.
+// does not drown the others. An output that stands for several equal channels has the sum of their weights.
 std::vector<float> ChannelWeights(const MaterialReference& reference);
 
 // Statistics of one mip. Deterministic for any thread count.

@@ -49,7 +49,8 @@ Result<std::vector<int>> GivenChannels(const MapSource& source, const ImageInfo&
   for (const char letter : source.channels) {
     int channel = static_cast<int>(std::string("rgba").find(letter));
     if (letter == 'a' && info.has_alpha()) channel = info.alpha_channel;
-    if (letter != 'a' && info.loaded_channels == 1) channel = 0;  // grey
+    // Grey, with or without alpha.
+    if (letter != 'a' && info.loaded_channels == (info.has_alpha() ? 2 : 1)) channel = 0;
     if (channel < 0 || channel >= info.loaded_channels) {
       return Fail(ErrorCode::kInvalidArgument,
                   source.path + ": " + source.role + " is wanted from channel " + letter +

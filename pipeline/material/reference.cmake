@@ -7,4 +7,4 @@ add_library(patina_reference STATIC
   ${CMAKE_CURRENT_LIST_DIR}/reference.cpp
   ${CMAKE_CURRENT_LIST_DIR}/source_maps.cpp
 )
-target_link_libraries(patina_reference PUBLIC patina_target patina_image patina_color patina_base)
+target_link_libraries(patina_reference PUBLIC patina_target patina_image patina_color patina_effects patina_base)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -69,9 +70,13 @@ class Builder {
         ChooseEncodings(files_, result_.files, result_.width, result_.height,
                         options_.color.logarithms, pool_, &plans_));
     MeasureMip0();
+    JudgeAll();
     DescribeChannels();
     DescribeMaps();
     PATINA_TRY(BuildMips());
+    KeepWantedMips();
+    DropLeftOut();
+    AddConstantMaps();
     Report(1);
     return std::move(result_);
   }
@@ -135,7 +140,8 @@ class Builder {
             range[c].Add(s.coded.data(), width);
           }
           if (IsOpacity(plan)) {
-            for (int x = 0; x < width; ++x) visible[task] += s.planes[0][x] >= kOpacityCutoff;
+            const float cutoff = options_.opacity_cutoff.value_or(kOpacityCutoff);
+            for (int x = 0; x < width; ++x) visible[task] += s.planes[0][x] >= cutoff;
           }
         }
         range += plan.components();
@@ -169,27 +175,78 @@ class Builder {
     return std::strcmp(plan.role->name, "opacity") == 0;
   }
 
-  void DescribeChannels() {
-    size_t index = 0;
-    int learned = 0;
+  // What the samples say of each channel, and of the maps without a file behind them.
+  void JudgeAll() {
+    std::vector<ChannelFacts> facts;
     for (const MapPlan& plan : plans_) {
-      for (int c = 0; c < plan.components(); ++c, ++index) {
-        TargetChannel channel;
-        channel.map = plan.role->name;
-        channel.component = ComponentName(plan.role->kind, c);
-        channel.encoding = plan.encoding;
-        channel.min_value = ranges_[index].low;
-        channel.max_value = ranges_[index].high;
-        channel.constant = channel.min_value == channel.max_value;
-        if (channel.constant) channel.constant_value = channel.min_value;
-        if (channel.encoding == Encoding::kLinear && !channel.constant) {
-          channel.scale = ScaleOfRange(channel.min_value, channel.max_value);
-          channel.min_value /= channel.scale;
-          channel.max_value /= channel.scale;
+      for (int c = 0; c < plan.components(); ++c) {
+        const Range& range = ranges_[facts.size()];
+        const float unit =
+            plan.encoding == Encoding::kLinear ? ScaleOfRange(range.low, range.high) : 1.0f;
+        facts.push_back(
+            {plan.role->name, ComponentName(plan.role->kind, c), range.low, range.high, unit});
+      }
+    }
+    const size_t of_files = facts.size();
+    for (const ConstantMap& map : options_.constants) {
+      for (const float value : map.value) facts.push_back({map.role, "", value, value, 1});
+    }
+    verdicts_ = JudgeChannels(facts, options_.effects);
+    constant_verdicts_.assign(verdicts_.begin() + static_cast<std::ptrdiff_t>(of_files),
+                              verdicts_.end());
+    verdicts_.resize(of_files);
+  }
+
+  // The plan and component of a channel.
+  struct Component {
+    size_t plan = 0;
+    int component = 0;
+  };
+
+  void DescribeChannels() {
+    std::vector<Component> components;
+    for (size_t p = 0; p < plans_.size(); ++p) {
+      for (int c = 0; c < plans_[p].components(); ++c) components.push_back({p, c});
+    }
+    int learned = 0;
+    for (size_t index = 0; index < components.size(); ++index) {
+      const MapPlan& plan = plans_[components[index].plan];
+      const ChannelVerdict& verdict = verdicts_[index];
+      TargetChannel channel;
+      channel.map = plan.role->name;
+      channel.component = ComponentName(plan.role->kind, components[index].component);
+      channel.encoding = plan.encoding;
+      channel.min_value = ranges_[index].low;
+      channel.max_value = ranges_[index].high;
+      channel.constant = verdict.state == EffectState::kConstant;
+      if (channel.constant) {
+        channel.constant_value = channel.min_value = channel.max_value = verdict.constant;
+      } else if (channel.encoding == Encoding::kLinear) {
+        channel.scale = ScaleOfRange(channel.min_value, channel.max_value);
+        channel.min_value /= channel.scale;
+        channel.max_value /= channel.scale;
+      }
+      Effect effect{ChannelName(channel.map, channel.component), verdict.state, verdict.reason, 0};
+      if (verdict.state == EffectState::kLearned) {
+        const int twin = EqualChannel(components, index);
+        channel.learned_index =
+            twin < 0 ? learned++
+                     : result_.material.channels[static_cast<size_t>(twin)].learned_index;
+        if (twin >= 0) {
+          const TargetChannel& other = result_.material.channels[static_cast<size_t>(twin)];
+          effect.state = EffectState::kDerived;
+          effect.reason = "equal to " + ChannelName(other.map, other.component);
         }
-        if (channel.encoding == Encoding::kSignedLog) channel.scale = plan.scale;
-        channel.learned_index = channel.constant ? -1 : learned++;
-        result_.material.channels.push_back(std::move(channel));
+      }
+      if (channel.encoding == Encoding::kSignedLog) channel.scale = plan.scale;
+      effect.outputs = effect.state == EffectState::kLearned ? 0 : 1;
+      result_.material.channels.push_back(std::move(channel));
+      result_.effects.push_back(std::move(effect));
+      const bool last_of_normal =
+          plan.role->kind == MapKind::kNormal && components[index].component == 1;
+      if (last_of_normal && verdict.state != EffectState::kLeftOut) {
+        result_.effects.push_back({ChannelName(plan.role->name, "z"), EffectState::kDerived,
+                                   "the length of a normal is 1", 1});
       }
     }
     TargetPyramid& pyramid = result_.material.pyramid;
@@ -203,6 +260,123 @@ class Builder {
       if (width == 1 && height == 1) break;
       width = NextMipSide(width);
       height = NextMipSide(height);
+    }
+  }
+
+  // Whether the mips of a channel follow from its samples alone.
+  bool IsFilteredPlainly(const MapPlan& plan) const {
+    if (plan.encoding == Encoding::kNormalXy || IsOpacity(plan)) return false;
+    const std::string role = plan.role->name;
+    return !options_.widen_roughness || (role != "roughness" && role != "clearcoat_roughness");
+  }
+
+  // The first channel before `index` that has the same coded values on every mip, or -1.
+  int EqualChannel(const std::vector<Component>& components, size_t index) const {
+    const MapPlan& plan = plans_[components[index].plan];
+    if (!options_.effects.equal || !IsFilteredPlainly(plan)) return -1;
+    for (size_t other = 0; other < index; ++other) {
+      const MapPlan& twin = plans_[components[other].plan];
+      const bool alike = verdicts_[other].state == EffectState::kLearned &&
+                         twin.encoding == plan.encoding && twin.scale == plan.scale &&
+                         IsFilteredPlainly(twin) &&
+                         ranges_[other].low == ranges_[index].low &&
+                         ranges_[other].high == ranges_[index].high;
+      if (alike && HaveEqualSamples(components[other], components[index]))
+        return static_cast<int>(other);
+    }
+    return -1;
+  }
+
+  bool HaveEqualSamples(const Component& a, const Component& b) const {
+    const int width = result_.width;
+    std::array<std::vector<Scratch>, 2> scratch = {MakeScratch(width), MakeScratch(width)};
+    std::atomic<bool> equal{true};
+    pool_.ParallelFor(result_.height, [&](int y, int worker) {
+      if (!equal.load(std::memory_order_relaxed)) return;
+      NormalDefects ignored;
+      const auto load = [&](const Component& of, Scratch* s) {
+        const MapPlan& plan = plans_[of.plan];
+        LoadMapRow(plan, files_[plan.file], width, y, s->planes.data(), &ignored);
+        return s->planes[static_cast<size_t>(of.component)];
+      };
+      const float* first = load(a, &scratch[0][worker]);
+      const float* second = load(b, &scratch[1][worker]);
+      if (!std::equal(first, first + width, second)) equal.store(false, std::memory_order_relaxed);
+    });
+    return equal.load();
+  }
+
+  // Mips that nobody looks at are neither learned nor measured.
+  void KeepWantedMips() {
+    if (!options_.effects.mips || (!options_.lod_range && !options_.density)) return;
+    std::vector<TargetLevel>& levels = result_.material.pyramid.levels;
+    const int last = static_cast<int>(levels.size()) - 1;
+    std::array<int, 2> range =
+        options_.lod_range ? *options_.lod_range
+                           : LodRangeOf(*options_.density, result_.width, result_.height, last + 1);
+    range = {std::min(range[0], last), std::min(range[1], last)};
+    if (range[0] == 0 && range[1] == last) return;
+    const auto leave_out = [&](int first, int end) {
+      if (first >= end) return;
+      const std::string from = std::to_string(first), to = std::to_string(end - 1);
+      result_.effects.push_back({first == end - 1 ? "mip " + from : "mips " + from + " to " + to,
+                                 EffectState::kLeftOut, "outside of the mips that are looked at",
+                                 0});
+    };
+    leave_out(0, range[0]);
+    leave_out(range[1] + 1, last + 1);
+    levels.erase(levels.begin() + range[1] + 1, levels.end());
+    levels.erase(levels.begin(), levels.begin() + range[0]);
+    result_.material.pyramid.first_mip = range[0];
+    result_.lod_range = range;
+  }
+
+  void DropLeftOut() {
+    std::vector<TargetChannel> kept;
+    for (size_t i = 0; i < verdicts_.size(); ++i) {
+      if (verdicts_[i].state != EffectState::kLeftOut)
+        kept.push_back(std::move(result_.material.channels[i]));
+    }
+    result_.material.channels = std::move(kept);
+    std::erase_if(result_.maps, [&](const ReferenceMap& map) {
+      return std::none_of(result_.material.channels.begin(), result_.material.channels.end(),
+                          [&](const TargetChannel& channel) { return channel.map == map.role; });
+    });
+  }
+
+  void AddConstantMaps() {
+    size_t verdict = 0;
+    for (const ConstantMap& map : options_.constants) {
+      const MapRole& role = *FindMapRole(map.role);
+      const int place = MapRoleIndex(map.role);
+      std::vector<TargetChannel> channels;
+      for (size_t c = 0; c < map.value.size(); ++c, ++verdict) {
+        const bool left_out = constant_verdicts_[verdict].state == EffectState::kLeftOut;
+        TargetChannel channel;
+        channel.map = map.role;
+        channel.component = ComponentName(role.kind, static_cast<int>(c));
+        channel.constant = true;
+        channel.constant_value = channel.min_value = channel.max_value = map.value[c];
+        std::string reason = constant_verdicts_[verdict].reason;
+        if (!left_out) reason = "constant in the scene";
+        result_.effects.push_back({ChannelName(map.role, channel.component),
+                                   left_out ? EffectState::kLeftOut : EffectState::kConstant,
+                                   reason, 1});
+        if (!left_out) channels.push_back(std::move(channel));
+      }
+      if (channels.empty()) continue;
+      auto& all = result_.material.channels;
+      const auto at = std::find_if(all.begin(), all.end(), [&](const TargetChannel& channel) {
+        return MapRoleIndex(channel.map) > place;
+      });
+      all.insert(at, channels.begin(), channels.end());
+      ReferenceMap described;
+      described.role = map.role;
+      described.type = SampleType::kFloat;
+      const auto before =
+          std::find_if(result_.maps.begin(), result_.maps.end(),
+                       [&](const ReferenceMap& other) { return MapRoleIndex(other.role) > place; });
+      result_.maps.insert(before, std::move(described));
     }
   }
 
@@ -232,7 +406,7 @@ class Builder {
   // by a power of two, which is exact both ways.
   static float ScaleOfRange(float low, float high) {
     const float largest = std::max(std::abs(low), std::abs(high));
-    if (largest <= 1.0f && largest >= 0x1p-10f) return 1.0f;
+    if (largest == 0 || (largest <= 1.0f && largest >= 0x1p-10f)) return 1.0f;
     return std::clamp(std::exp2(std::ceil(std::log2(largest))), 0x1p-100f, 0x1p100f);
   }
 
@@ -362,10 +536,10 @@ class Builder {
     for (size_t p = 0; p < plans_.size(); ++p) {
       if (places[p].plane < 0) continue;
       widening[p] = WideningNormals(p, places);
-      if (IsOpacity(plans_[p])) {
+      if (IsOpacity(plans_[p]) && options_.opacity_cutoff) {
         const size_t texels = static_cast<size_t>(width) * level.height;
-        scales[p] =
-            CoverageScale({level.Row(places[p].plane, 0), texels}, coverage_, kOpacityCutoff);
+        scales[p] = CoverageScale({level.Row(places[p].plane, 0), texels}, coverage_,
+                                  *options_.opacity_cutoff);
       }
     }
     const size_t channels = result_.material.channels.size();
@@ -439,8 +613,10 @@ class Builder {
   Clock::time_point started_;
   std::vector<LoadedFile> files_;
   std::vector<MapPlan> plans_;
-  std::vector<Range> ranges_;  // of mip 0, one for each component of each plan
-  double coverage_ = 0;        // of opacity on mip 0
+  std::vector<Range> ranges_;                      // of mip 0, one for each component of each plan
+  std::vector<ChannelVerdict> verdicts_;           // likewise
+  std::vector<ChannelVerdict> constant_verdicts_;  // of options_.constants
+  double coverage_ = 0;                            // of opacity on mip 0
   SourceReference result_;
 };
 

@@ -2,13 +2,17 @@
 // and what they mean.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/base/result.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/base/thread_pool.h"
+#include "pipeline/effects/effects.h"
 #include "pipeline/image/image.h"
 #include "pipeline/image/map_finder.h"
 #include "pipeline/material/color_choice.h"
@@ -19,6 +23,12 @@ namespace patina {
 // Opacity at or above this counts as there when a mip's coverage is kept. The default of glTF's
 // alphaCutoff.
 inline constexpr float kOpacityCutoff = 0.5f;
+
+// A map without a file.
+struct ConstantMap {
+  std::string role;
+  std::vector<float> value;  // physical (linear), one for each component; no normals
+};
 
 struct ReferenceOptions {
   AddressMode address = AddressMode::kWrap;
@@ -31,6 +41,15 @@ struct ReferenceOptions {
   // both maps exist and neither is constant.
   bool widen_roughness = true;
   ColorOptions color;
+  // Mips of opacity keep the coverage at kOpacityCutoff or at this; none: they are plain means.
+  std::optional<float> opacity_cutoff = kOpacityCutoff;
+  std::vector<ConstantMap> constants;  // in addition to the maps of the set
+  EffectSwitches effects;
+  // The mips that are wanted, where the effect is on; both absent: all.
+  std::optional<std::array<int, 2>> lod_range;
+  std::optional<TexelDensity> density;
+  // Reads a file, perhaps one that others read, too; empty: ReadImage. Called by several threads.
+  std::function<Result<Image>(const std::string& path)> read_image;
   uint64_t max_texels = uint64_t{1} << 26;  // of mip 0; larger sets are refused
   const CancelToken* cancel = nullptr;
 };
@@ -73,6 +92,8 @@ struct SourceReference {
   std::vector<ReferenceFile> files;  // each once, in the order of first use
   std::vector<ReferenceMap> maps;    // in the order of MapRoles()
   std::vector<MapNote> notes;        // the set's, and what the pixels added
+  std::vector<Effect> effects;       // what became of each channel, in manifest order; then mips
+  std::optional<std::array<int, 2>> lod_range;  // of the pyramid, if it is not the full chain
   // Complete sentences that begin with the file's name; also sent to the sink.
   std::vector<std::string> warnings;
 };
@@ -89,9 +110,11 @@ struct SourceReference {
 // Mips: each side max(1, floor(side / 2)) down to 1x1; every level is the exact area mean (see
 // mip_filter.h) of the level before in float: colours in linear light; normals as vectors,
 // renormalised; roughness widened by the variance of the normals; opacity scaled to the coverage of
-// mip 0; everything else in its own domain. A channel that is constant on mip 0 is not learned;
-// constant_value is that value. min_value and max_value are the range over all mips: it is that of
-// mip 0 but for roughness and normals, which filtering can carry beyond it.
+// mip 0; everything else in its own domain. A channel that is constant on mip 0, exactly or within
+// the tolerance of `effects`, is not learned; constant_value is that value. Channels that have the
+// same coded values on all mips share one channel of the pyramid; channels that mean nothing, as
+// what governs them is 0, are left out. min_value and max_value are the range over all mips: it is
+// that of mip 0 but for roughness and normals, which filtering can carry beyond it.
 //
 // The result does not depend on the number of threads. Sets the threads of SetImageIoThreads to
 // those of `pool`. Errors: those of ReadImage; kInvalidArgument (an empty set, a normal map of one

@@ -61,7 +61,7 @@ class Loader {
   }
 
   Status LoadFiles() {
-    if (set_.maps.empty()) {
+    if (set_.maps.empty() && options_.constants.empty()) {
       return Fail(ErrorCode::kInvalidArgument,
                   set_.name + ": the set has no maps; name at least one");
     }
@@ -77,10 +77,11 @@ class Loader {
       }
     }
     const int count = static_cast<int>(paths.size());
-    SetImageIoThreads(std::max(1, pool_.threads() / count));
+    SetImageIoThreads(std::max(1, pool_.threads() / std::max(1, count)));
     std::vector<std::optional<Result<Image>>> loaded(count);
     pool_.ParallelFor(count, [&](int i, int) {
-      if (!cancelled()) loaded[i].emplace(ReadImage(paths[i]));
+      if (cancelled()) return;
+      loaded[i].emplace(options_.read_image ? options_.read_image(paths[i]) : ReadImage(paths[i]));
     });
     SetImageIoThreads(pool_.threads());
     if (cancelled()) return Cancelled();
@@ -140,7 +141,7 @@ class Loader {
       maps_.descriptions[file].roles.push_back(plan.role->name);
       maps_.plans.push_back(std::move(plan));
     }
-    if (maps_.plans.empty()) {
+    if (maps_.plans.empty() && options_.constants.empty()) {
       return Fail(ErrorCode::kInvalidArgument,
                   set_.name + ": none of the maps says anything; name other maps");
     }
@@ -157,6 +158,7 @@ class Loader {
   }
 
   Status UnifySizes() {
+    if (maps_.plans.empty()) maps_.width = maps_.height = 1;
     const bool all_constant = std::all_of(maps_.plans.begin(), maps_.plans.end(),
                                           [](const MapPlan& plan) { return plan.constant_file; });
     for (const MapPlan& plan : maps_.plans) {

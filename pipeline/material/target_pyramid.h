@@ -27,13 +27,13 @@ struct TargetChannel {
   std::string map;         // role: "albedo", "normal", "ao", "roughness", "metalness", "displacement", "emissive", ...
   std::string component;   // "r", "g", "b", "x", "y", or "" for a map of one channel
   Encoding encoding = Encoding::kLinear;
-  bool constant = false;   // every texel of mip 0 has constant_value exactly: not learned
+  bool constant = false;   // every texel of mip 0 has constant_value, within the tolerance: not learned
   float constant_value = 0;  // coded
   // A power of two. kLinear: brings coded values near [-1, 1], where half weights hold them. kSignedLog: see there. Else 1.
   float scale = 1;
   float min_value = 0;     // range of mip 0, coded; decoders clamp to it
   float max_value = 1;
-  int learned_index = -1;  // channel of the TargetPyramid, or -1 when constant
+  int learned_index = -1;  // channel of the TargetPyramid, or -1 when constant; equal channels have the same
 };
 
 // What an error of the channel's coded values is measured against: 1, but for logarithms the largest magnitude they reach.
@@ -64,9 +64,11 @@ struct TargetLevel {
   void FillPadding(AddressMode address);
 };
 
-// Levels 0 (the source's size) to the 1x1 level; each side is max(1, floor(previous / 2)).
+// Levels `first_mip` of the source to the last one that is wanted, usually 0 to the 1x1 level; each side is
+// max(1, floor(previous / 2)).
 struct TargetPyramid {
-  int channels = 0;  // learned channels only
+  int channels = 0;  // learned channels only, equal ones once
+  int first_mip = 0;
   AddressMode address = AddressMode::kWrap;
   std::vector<TargetLevel> levels;
 };

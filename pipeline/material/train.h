@@ -32,7 +32,7 @@ Result<Quality> ParseQuality(const std::string& name);
 Result<Recipe> ParseRecipe(const std::string& name);
 
 // Raised whenever the same input, job and seed would give other bytes. Part of the fingerprint.
-inline constexpr int kRecipeVersion = 2;
+inline constexpr int kRecipeVersion = 3;
 
 // One feature texture. Level l is max(1, width >> l) x max(1, height >> l) texels.
 struct FeatureShape {

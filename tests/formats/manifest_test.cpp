@@ -51,6 +51,49 @@ TEST(Manifest, ReadingAndWritingAgainGivesTheSameBytes) {
   EXPECT_EQ(manifest->network->outputs, 5);
 }
 
+TEST(Manifest, ReadsWhatOlderOnesLeftOutAsEffects) {
+  const auto text = ReadTextFile(ExamplePath("manifest_left_out.json"), kMaxManifestBytes);
+  ASSERT_OK(text);
+  const auto manifest = ParseManifest(*text);
+  ASSERT_OK(manifest);
+  ASSERT_EQ(manifest->effects.size(), 1u);
+  EXPECT_EQ(manifest->effects[0].what, "albedo.b");
+  EXPECT_EQ(manifest->effects[0].state, "constant");
+  EXPECT_EQ(manifest->effects[0].reason, "constant 0.25");
+  EXPECT_FALSE(manifest->effects[0].saved.has_value());
+}
+
+TEST(Manifest, CountsItsVersionUpOnlyForWhatOlderReadersWouldDecodeWrongly) {
+  Manifest manifest = FullManifest();
+  manifest.scene.emplace().file = "a.glb";
+  EXPECT_EQ(json::parse(*ToJson(manifest))["format_version"], 1);
+  Manifest shared = manifest;
+  shared.channels.push_back(shared.channels[5]);
+  shared.channels.back().map = "specular";
+  const auto two_of_one = ToJson(shared);
+  ASSERT_OK(two_of_one);
+  EXPECT_EQ(json::parse(*two_of_one)["format_version"], 2);
+  Manifest part = manifest;
+  part.lod_range = {1, 4};
+  part.features[3].levels = 2;
+  const auto text = ToJson(part);
+  ASSERT_OK(text);
+  EXPECT_EQ(json::parse(*text)["format_version"], 2);
+  EXPECT_EQ(ParseManifest(*text)->lod_range, part.lod_range);
+}
+
+TEST(Manifest, KeepsWhatASceneSays) {
+  const auto text = ReadTextFile(ExamplePath("manifest_scene.json"), kMaxManifestBytes);
+  ASSERT_OK(text);
+  const auto manifest = ParseManifest(*text);
+  ASSERT_OK(manifest);
+  EXPECT_EQ(*ToJson(*manifest), *text);
+  ASSERT_TRUE(manifest->scene.has_value());
+  EXPECT_EQ(manifest->scene->factors[0].value, (std::vector<double>{4, 4, 2.5}));
+  EXPECT_EQ(manifest->scene->bindings[0].transform.rotation, 0.25);
+  EXPECT_EQ(manifest->scene->bindings[0].wrap_t, SceneWrap::kClamp);
+}
+
 TEST(Manifest, WritesFloatsWithTheirOwnDigits) {
   Manifest manifest = FullManifest();
   manifest.channels[0].range_min = 0.1f;
@@ -198,7 +241,28 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRules) {
       {"/network/activation", [](Manifest* m) { m->network->activation = "gelu"; }},
       {"/network/outputs", [](Manifest* m) { m->network->outputs = 6; }},
       {"/channels", [](Manifest* m) { m->channels.clear(); }},
-      {"/channels/1/output", [](Manifest* m) { m->channels[1].output = 1; }},
+      // Shared outputs leave another one without a channel here, and need equal ranges.
+      {"/network/outputs",
+       [](Manifest* m) { m->channels[1] = m->channels[0], m->channels[1].component = "g"; }},
+      {"/channels/1/range",
+       [](Manifest* m) {
+         m->channels[1].output = 1;
+         m->channels[1].range_max = 0.75f;
+       }},
+      {"/lod_range",
+       [](Manifest* m) {
+         m->lod_range = {2, 1};
+       }},
+      {"/lod_range",
+       [](Manifest* m) {
+         m->lod_range = {0, 17};
+       }},
+      {"/effects/0/state", [](Manifest* m) { m->effects[0].state = "forgotten"; }},
+      {"/scene/alpha_mode", [](Manifest* m) { m->scene.emplace().alpha_mode = "x"; }},
+      {"/scene/factors/0",
+       [](Manifest* m) {
+         m->scene.emplace().factors = {{"albedo", {NAN}}};
+       }},
       {"/channels/1/output", [](Manifest* m) { m->channels[1].output = 5; }},
       {"/channels/0/range", [](Manifest* m) { m->channels[0].range_min = 2; }},
       {"/channels/0/range", [](Manifest* m) { m->channels[0].range_min = NAN; }},

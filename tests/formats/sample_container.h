@@ -74,7 +74,8 @@ inline Manifest FullManifest() {
   manifest.training.float_psnr_mean_mips_db = 36.875;
   manifest.training.rollbacks = 1;
   manifest.training.curve = {{1000000, 25.5, 30.25}, {400000000, 30.75, 36.875}};
-  manifest.left_out = {{"albedo.b", "constant 0.25", "1 network output"}};
+  manifest.effects = {{"albedo.b", "constant", "constant 0.25", ManifestSavings{34, 16, 0, 4800}},
+                      {"albedo.r", "learned", "", std::nullopt}};
   manifest.warnings = {"readme.tif was not recognised"};
   return manifest;
 }

@@ -49,7 +49,7 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
   manifest.quality.gate_min_psnr_db = 10;
   manifest.training.stopped_by = "budget";
   manifest.training.curve = {{10, 1.5, 2.5}};
-  manifest.left_out = {{"a", "b", "c"}};
+  manifest.effects = {{"a", "constant", "c", ManifestSavings{1, 2, 3, 4}}};
   manifest.warnings = {"w"};
   const std::string text = ToJson(manifest).value();
   const std::string compact = nlohmann::json::parse(text).dump();

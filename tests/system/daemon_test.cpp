@@ -7,6 +7,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -174,6 +175,31 @@ TEST_F(DaemonTest, BakesEveryMaterialOfAFolder) {
   });
   Stop(daemon.get());
   EXPECT_FALSE(fs::exists(folder_ / "out/set"));
+}
+
+TEST_F(DaemonTest, BakesTheMaterialsOfASceneAndNotItsTextures) {
+  Drop("car", 1);
+  std::ofstream(folder_ / "drop/car/car.gltf") << R"({
+    "asset": {"version": "2.0"},
+    "materials": [{"name": "paint", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}},
+                  {"name": "chrome"},
+                  {"name": "broken", "normalTexture": {"index": 7}}],
+    "textures": [{"source": 0}], "images": [{"uri": "mosaic_floor_basecolor.png"}]})";
+  auto daemon = Start();
+  Until(daemon.get(), [&] {
+    return fs::exists(folder_ / "out/car_car_paint/current/manifest.json") &&
+           fs::exists(folder_ / "out/car_car_chrome/current/manifest.json") &&
+           fs::exists(folder_ / "drop/car_car_broken.failed.json");
+  });
+  Stop(daemon.get());
+  EXPECT_NE(ReadAll(folder_ / "drop/car_car_broken.failed.json").find("/textures/7"),
+            std::string::npos);
+  std::vector<std::string> assets;
+  for (const auto& entry : fs::directory_iterator(folder_ / "out")) {
+    if (fs::exists(entry.path() / "current")) assets.push_back(entry.path().filename().string());
+  }
+  std::sort(assets.begin(), assets.end());
+  EXPECT_EQ(assets, (std::vector<std::string>{"car_car_chrome", "car_car_paint"})) << Log();
 }
 
 TEST_F(DaemonTest, ASecondOneOnTheSameStateRefusesAndSaysWhoHasIt) {

@@ -68,6 +68,27 @@ TEST(Roots, AColourConfigurationLiesWithinTheRootsAndIsReadWithItsTables) {
   }
 }
 
+TEST(Roots, AScenesFolderIsItsInput) {
+  const patina::test::TemporaryDirectory folder;
+  fs::create_directories(folder / "in/car");
+  std::ofstream(folder / "in/car/car.glb") << "g";
+  std::ofstream(folder / "secret.glb") << "s";
+  fs::create_symlink(folder / "secret.glb", folder / "in/car/link.glb");
+  const Roots roots{{folder / "in"}, {folder / "out"}};
+  Job job;
+  job.out = folder / "out";
+  job.scene = folder / "in/car/../car/car.glb";
+  job.scene_material = "paint";
+  ASSERT_OK(ConfineJob(roots, &job));
+  const std::string real = fs::canonical(folder / "in/car").string();
+  EXPECT_EQ(job.scene, real + "/car.glb");
+  EXPECT_EQ(InputsOf(job, roots), std::vector<std::string>{real});
+  for (const char* outside : {"secret.glb", "in/../secret.glb", "in/car/link.glb"}) {
+    job.scene = folder / outside;
+    EXPECT_EQ(patina::test::MessageOf(ConfineJob(roots, &job)).rfind("/scene: ", 0), 0u) << outside;
+  }
+}
+
 TEST(Roots, LinksWithinTheRootsAreInputsToo) {
   const patina::test::TemporaryDirectory folder;
   fs::create_directories(folder / "in/wall");

@@ -14,6 +14,9 @@ namespace {
 
 TEST(AssetFiles, KnowsRolesByName) {
   EXPECT_EQ(RoleOfFile("wall_albedo.PNG"), FileRole::kImage);
+  EXPECT_EQ(RoleOfFile("car.glb"), FileRole::kImage);
+  EXPECT_EQ(RoleOfFile("car.GLTF"), FileRole::kImage);
+  EXPECT_EQ(RoleOfFile("car.patina.json"), FileRole::kImage);
   EXPECT_EQ(RoleOfFile("chrome.binary"), FileRole::kBrdf);
   EXPECT_EQ(RoleOfFile("list.csv"), FileRole::kBrdf);
   EXPECT_EQ(RoleOfFile("albedo.png.part"), FileRole::kOther);

@@ -174,6 +174,7 @@ TEST_F(Reference, FindsConstantChannelsExactly) {
                         : static_cast<float>(x) / 8;
       }));
   List("albedo", "a.png");
+  options_.effects.constant_tolerance = 0;
   const SourceReference reference = MustBuild();
   EXPECT_TRUE(Channel(reference, "albedo", "r")->constant);
   EXPECT_EQ(Channel(reference, "albedo", "r")->constant_value, 51.0f / 255.0f);
@@ -453,6 +454,7 @@ TEST_F(Reference, ChoosesTheChannelThatSaysSomething) {
 TEST_F(Reference, RepeatsGreyColour) {
   Add("a.png", Noise(8, 8, 1));
   List("albedo", "a.png");
+  options_.effects.equal = false;
   const SourceReference reference = MustBuild();
   EXPECT_EQ(reference.material.pyramid.channels, 3);
   EXPECT_EQ(At(reference, 0, 3, 3, "albedo", "r"), At(reference, 0, 3, 3, "albedo", "b"));
