@@ -202,6 +202,17 @@ TEST_F(DaemonTest, BakesTheMaterialsOfASceneAndNotItsTextures) {
   EXPECT_EQ(assets, (std::vector<std::string>{"car_car_chrome", "car_car_paint"})) << Log();
 }
 
+// They take half a second and 60 MB, and one of them starts threads that signals would go to.
+TEST_F(DaemonTest, LoadsNoImageLibraries) {
+  const auto daemon = Start();
+  Until(daemon.get(), [&] { return Log().find("ready") != std::string::npos; });
+  const std::string maps = ReadAll("/proc/" + std::to_string(daemon->pid()) + "/maps");
+  EXPECT_NE(maps.find("libsqlite3"), std::string::npos);
+  EXPECT_EQ(maps.find("libOpenImageIO"), std::string::npos);
+  EXPECT_EQ(maps.find("libOpenColorIO"), std::string::npos);
+  Stop(daemon.get());
+}
+
 TEST_F(DaemonTest, ASecondOneOnTheSameStateRefusesAndSaysWhoHasIt) {
   auto daemon = Start();
   Until(daemon.get(), [&] { return Count(Log(), " ready ") == 1; });

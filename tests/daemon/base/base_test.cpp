@@ -90,6 +90,39 @@ TEST(StateLock, IsHeldByOneProcessAndSaysByWhich) {
   EXPECT_EQ(StateLock::Acquire(folder / "missing").error().code, ErrorCode::kNotFound);
 }
 
+// A daemon that was killed between fork and exec: its child has the lock a little longer.
+TEST(StateLock, WaitsForWhatAKilledDaemonLeftBehind) {
+  const patina::test::TemporaryDirectory folder;
+  int release[2], gone[2];
+  ASSERT_EQ(::pipe(release), 0);
+  ASSERT_EQ(::pipe(gone), 0);
+  const pid_t daemon = ::fork();
+  ASSERT_GE(daemon, 0);
+  if (daemon == 0) {
+    const auto lock = StateLock::Acquire(folder.path());
+    if (!lock || ::fork() != 0) ::_exit(lock ? 0 : 1);
+    ::close(release[1]);
+    char byte;
+    (void)!::read(release[0], &byte, 1);
+    ::_exit(0);
+  }
+  int status = -1;
+  ASSERT_EQ(::waitpid(daemon, &status, 0), daemon);
+  ASSERT_EQ(status, 0);
+  ::close(gone[1]);
+  int pauses = 0;
+  const auto lock = StateLock::Acquire(folder.path(), [&] {
+    if (++pauses > 1) return;
+    ::close(release[1]);
+    char byte;
+    EXPECT_EQ(::read(gone[0], &byte, 1), 0);  // the end of all who had the other end
+  });
+  ASSERT_OK(lock);
+  EXPECT_EQ(pauses, 1);
+  ::close(release[0]);
+  ::close(gone[0]);
+}
+
 TEST(ServiceManager, IsToldThroughItsSocket) {
   const patina::test::TemporaryDirectory folder;
   const std::string path = folder / "notify";
