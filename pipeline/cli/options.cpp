@@ -20,6 +20,7 @@ constexpr const char* kExamples =
     "  patina bake sample --out baked                   bake a folder of maps\n"
     "  patina bake textures/* --out baked --quality preview\n"
     "  patina bake wall --out baked --profile bcf-2k --min-psnr 30\n"
+    "  patina bake scene.glb --out baked                every material of a glTF scene\n"
     "  patina bake chrome.binary steel.bsdf --out baked bake measured BRDFs\n"
     "  patina info baked/sample                         what a container holds and how good it is\n"
     "  patina unpack baked/sample --out maps            the maps back as images\n"
@@ -105,7 +106,7 @@ CLI::Option* AddOverride(CLI::App* command, const std::string& name, std::option
 
 void AddBake(CLI::App* app, CommandLine* line) {
   CLI::App* command =
-      app->add_subcommand("bake", "Bake PBR texture sets and measured BRDFs into containers");
+      app->add_subcommand("bake", "Bake texture sets, scenes and measured BRDFs into containers");
   BakeOptions& o = line->bake;
   command
       ->add_option("INPUT", o.inputs,
@@ -261,7 +262,9 @@ void AddUnpack(CLI::App* app, CommandLine* line) {
                    "A container, or the folder of an asset (its current container)")
       ->required();
   command->add_option("-o,--out", o.out, "Folder for the images")->required()->type_name("DIR");
-  command->add_option("--mip", o.mip, "Mip level, 0 being the size of the source")
+  command
+      ->add_option("--mip", o.mip,
+                   "Mip level, 0 being the size of the source; default: the finest that is stored")
       ->check(CLI::Range(0, 16))
       ->type_name("N");
   command

@@ -56,7 +56,7 @@ struct RunOptions {
 struct UnpackArguments {
   std::string container;
   std::string out;
-  int mip = 0;
+  std::optional<int> mip;
   std::string format;  // "png" or "exr"; empty: by what is written
   std::string space;   // of colour maps; empty: sRGB or linear Rec.709
   std::string ocio;    // empty: $OCIO, else the built-in one

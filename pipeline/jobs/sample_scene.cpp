@@ -77,13 +77,7 @@ constexpr const char* kSceneFile = R"({
 
 Result<std::vector<std::string>> WriteSampleScene(const std::string& folder, int size,
                                                   uint64_t seed, ThreadPool& pool) {
-  if (size < 1 || size > kMaxSampleSide) {
-    return Fail(ErrorCode::kInvalidArgument, "the size of a sample must be between 1 and " +
-                                                 std::to_string(kMaxSampleSide) + " texels; is " +
-                                                 std::to_string(size));
-  }
-  PATINA_TRY(MakeDirectories(folder));
-  const SampleMaterial material = MakeSampleMaterial(size, seed, pool);
+  PATINA_ASSIGN(const SampleMaterial material, StartSample(folder, size, seed, pool));
   struct File {
     const char* name;
     const std::vector<float>& values;

@@ -3,19 +3,23 @@
 #include "formats/base/file_io.h"
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/job.h"
-#include "pipeline/jobs/sample_material.h"
 
 namespace patina {
 
-Result<std::vector<std::string>> WriteSampleSet(const std::string& folder, int size, uint64_t seed,
-                                                ThreadPool& pool) {
+Result<SampleMaterial> StartSample(const std::string& folder, int size, uint64_t seed,
+                                   ThreadPool& pool) {
   if (size < 1 || size > kMaxSampleSide) {
     return Fail(ErrorCode::kInvalidArgument, "the size of a sample must be between 1 and " +
                                                  std::to_string(kMaxSampleSide) + " texels; is " +
                                                  std::to_string(size));
   }
   PATINA_TRY(MakeDirectories(folder));
-  const SampleMaterial material = MakeSampleMaterial(size, seed, pool);
+  return MakeSampleMaterial(size, seed, pool);
+}
+
+Result<std::vector<std::string>> WriteSampleSet(const std::string& folder, int size, uint64_t seed,
+                                                ThreadPool& pool) {
+  PATINA_ASSIGN(const SampleMaterial material, StartSample(folder, size, seed, pool));
   struct File {
     const char* name;
     WriteFormat format;

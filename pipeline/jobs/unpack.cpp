@@ -189,7 +189,6 @@ WriteFormat FormatFor(bool png, const std::string& source_type, const Picture& p
 Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder,
                                  const UnpackOptions& options, ThreadPool& pool,
                                  const CancelToken& cancel) {
-  const int mip = options.mip;
   PATINA_ASSIGN(const Container opened, OpenContainer(container));
   if (opened.manifest.kind != "material") {
     return Fail(ErrorCode::kUnsupported,
@@ -201,10 +200,13 @@ Result<Unpacked> UnpackContainer(const std::string& container, const std::string
   Decoder decoder;
   std::string problem;
   PATINA_TRY(DecoderStatus(Decoder::Load(opened.directory, &decoder, &problem), problem));
-  if (mip < 0 || mip >= decoder.levels()) {
-    return Fail(ErrorCode::kOutOfRange, opened.directory + ": there is no mip " +
-                                            std::to_string(mip) + "; its mips are 0 to " +
-                                            std::to_string(decoder.levels() - 1));
+  const std::array<int, 2> mips =
+      opened.manifest.lod_range.value_or(std::array<int, 2>{0, decoder.levels() - 1});
+  const int mip = options.mip.value_or(mips[0]);
+  if (mip < mips[0] || mip > mips[1]) {
+    return Fail(ErrorCode::kOutOfRange,
+                opened.directory + ": there is no mip " + std::to_string(mip) + "; its mips are " +
+                    std::to_string(mips[0]) + " to " + std::to_string(mips[1]));
   }
   const WorkingSpace working =
       ParseWorkingSpace(decoder.working_space()).value_or(WorkingSpace::kLinearRec709);

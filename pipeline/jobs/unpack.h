@@ -1,6 +1,7 @@
 // The maps of a container as images again, for tools without a decoder.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ enum class UnpackFormat {
 };
 
 struct UnpackOptions {
-  int mip = 0;
+  std::optional<int> mip;  // absent: the finest that is stored
   UnpackFormat format = UnpackFormat::kAuto;
   // Of colour maps: a space of the configuration. Empty: as files are read that say nothing, sRGB
   // in PNG and linear Rec.709 in EXR, whatever the container's working space is.
@@ -37,7 +38,7 @@ struct Unpacked {
 // for each map into `folder` (made if missing), named by role: albedo.png, normal.png, ao.png ...
 // in the size of that mip. Normals are 0.5 + 0.5 n of x, y, z, OpenGL, in both formats. Existing
 // files of those names are replaced. Errors: those of OpenContainer, VerifyPayloads and the
-// decoder; kUnsupported for a BRDF; kOutOfRange for a mip the source does not have; kCancelled,
+// decoder; kUnsupported for a BRDF; kOutOfRange for a mip that is not stored; kCancelled,
 // kIo, kResourceExhausted. Data maps are the same in every space. EXR files of ACEScg and
 // ACES2065-1 name their primaries. Also errors of ColorConfig, led by "--ocio" or "--space".
 Result<Unpacked> UnpackContainer(const std::string& container, const std::string& folder,

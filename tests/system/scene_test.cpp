@@ -9,6 +9,7 @@
 #include "formats/container.h"
 #include "formats/decoder/patina_decoder.h"
 #include "formats/schema_check.h"
+#include "pipeline/image/image_io.h"
 #include "tests/system/child_process.h"
 
 namespace patina {
@@ -160,6 +161,20 @@ TEST_F(Scenes, LearnEverythingWhenAskedTo) {
   EXPECT_EQ(StateOf(manifest, "emissive.r"), "learned");
   EXPECT_EQ(StateOf(manifest, "metalness"), "learned");
   EXPECT_EQ(manifest["network"]["outputs"], 10);
+}
+
+TEST_F(Scenes, UnpackTheFinestMipThatIsStored) {
+  const Outcome baked = Bake({folder_ / "in/mosaic.gltf", "--material", "floor", "--lod-range",
+                              "2,4", "--out", folder_ / "out"});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  const std::string asset = folder_ / "out/mosaic_floor";
+  ASSERT_EQ(Patina({"unpack", asset, "--out", folder_ / "maps"}).exit_code, 0);
+  auto info = ReadImageInfo(folder_ / "maps/albedo.png");
+  ASSERT_TRUE(info) << info.error().message;
+  EXPECT_EQ(info->width, 32 >> 2);
+  const Outcome finer = Patina({"unpack", asset, "--out", folder_ / "maps", "--mip", "1"});
+  EXPECT_EQ(finer.exit_code, 3);
+  EXPECT_THAT(finer.err, HasSubstr("there is no mip 1; its mips are 2 to 4"));
 }
 
 }  // namespace
