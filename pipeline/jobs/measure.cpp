@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <set>
 
 #include "formats/decoder/patina_decoder.h"
 #include "pipeline/jobs/decoder_status.h"
@@ -141,19 +142,17 @@ class LevelPlanes {
 
   bool finite() const { return finite_; }
 
-  // Brings coded values to a peak of 1.
+  // Brings coded values to a peak of 1. Equal channels share planes, and have the same factor.
   void Scale(const std::vector<ChannelPair>& channels, ThreadPool& pool) {
-    std::vector<const Decoder::Channel*> done;
+    std::set<int> references, outputs;
     for (const ChannelPair& pair : channels) {
       if (pair.factor == 1.0f) continue;
-      if (!pair.reference->constant)
-        ScalePlane(&reference_, pair.reference->learned_index, pair.factor, pool);
+      const int reference = pair.reference->constant ? -1 : pair.reference->learned_index;
       const int output = pair.decoded->output;
-      const bool again = std::any_of(done.begin(), done.end(), [output](const Decoder::Channel* d) {
-        return d->output == output;
-      });
-      done.push_back(pair.decoded);
-      if (output >= 0 && !again) ScalePlane(&decoded_, output, pair.factor, pool);
+      if (reference >= 0 && references.insert(reference).second)
+        ScalePlane(&reference_, reference, pair.factor, pool);
+      if (output >= 0 && outputs.insert(output).second)
+        ScalePlane(&decoded_, output, pair.factor, pool);
     }
   }
 

@@ -10,6 +10,7 @@
 #include "formats/container.h"
 #include "formats/decoder/patina_decoder.h"
 #include "formats/schema_check.h"
+#include "pipeline/base/rng.h"
 #include "pipeline/color/color.h"
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/compare.h"
@@ -282,6 +283,24 @@ TEST_F(ColorJobs, HdrSurvivesTraining) {
   comparison = CompareContainer(job_.out + "/wall", other, pool, cancel, NoProgress());
   ASSERT_FALSE(comparison);
   EXPECT_EQ(comparison.error().code, ErrorCode::kConflict);
+}
+
+// Red, green and blue share an output, and so the planes that are measured.
+TEST_F(ColorJobs, GreyHdrIsMeasuredOnce) {
+  std::vector<float> values;
+  Rng rng(8);
+  for (int i = 0; i < 64 * 64; ++i) {
+    const float value = i == 1000 ? 1e5f : 0.5f + rng.Uniform();
+    values.insert(values.end(), {value, value, value});
+  }
+  ASSERT_TRUE(WriteImage(folder_ + "/in/wall_emissive.exr", WriteFormat::kExrFloat, 64, 64, 3,
+                         values.data()));
+  job_.samples = 2e5;
+  const Container container = Baked();
+  ASSERT_EQ(container.manifest.channels[0].encoding, "signed_log");
+  ASSERT_TRUE(container.manifest.network);
+  EXPECT_EQ(container.manifest.network->outputs, 1);
+  EXPECT_GT(container.manifest.quality.psnr_overall_db, 20);
 }
 
 }  // namespace
