@@ -1,6 +1,8 @@
 #include "pipeline/jobs/scene_maps.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -66,6 +68,7 @@ class MapMaker {
              std::none_of(result_.set.maps.begin(), result_.set.maps.end(),
                           [&](const MapSource& map) { return map.role == factor.map; });
     });
+    PATINA_TRY(CheckFactors());
     result_.warnings = scene_.warnings;
     result_.warnings.insert(result_.warnings.end(), material_.warnings.begin(),
                             material_.warnings.end());
@@ -164,8 +167,35 @@ class MapMaker {
     }
     ConstantMap map;
     map.role = constant.map;
-    for (const double value : constant.value) map.value.push_back(static_cast<float>(value));
+    std::vector<double> value = constant.value;
+    if (role->kind == MapKind::kColor && InOtherSpace()) {
+      const auto matrix = ConversionMatrix(kRec709Primaries, PrimariesOf(job_.working_space));
+      for (size_t i = 0; i < 3; ++i) {
+        value[i] = 0;
+        for (size_t j = 0; j < 3; ++j) value[i] += (*matrix)[3 * i + j] * constant.value[j];
+      }
+    }
+    map.value.assign(value.begin(), value.end());
     result_.constants.push_back(std::move(map));
+    return {};
+  }
+
+  // A scene's own colours are linear Rec.709.
+  bool InOtherSpace() const { return job_.working_space != WorkingSpace::kLinearRec709; }
+
+  // A factor of a texture acts on each of red, green and blue, which are others after a conversion.
+  Status CheckFactors() const {
+    if (!InOtherSpace()) return {};
+    for (const SceneValue& factor : result_.scene->factors) {
+      const bool grey = std::adjacent_find(factor.value.begin(), factor.value.end(),
+                                           std::not_equal_to<>()) == factor.value.end();
+      if (grey) continue;
+      return Fail(ErrorCode::kUnsupported,
+                  Where() + "the factor of " + factor.map +
+                      " has a colour; it acts on linear Rec.709 and cannot follow the texture to " +
+                      WorkingSpaceName(job_.working_space) +
+                      "; bake this material with --working-space lin_rec709");
+    }
     return {};
   }
 

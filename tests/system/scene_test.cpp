@@ -163,6 +163,27 @@ TEST_F(Scenes, LearnEverythingWhenAskedTo) {
   EXPECT_EQ(manifest["network"]["outputs"], 10);
 }
 
+TEST_F(Scenes, BringTheirColoursToTheWorkingSpace) {
+  const Outcome brass = Bake({folder_ / "in/mosaic.gltf", "--material", "brass", "--working-space",
+                              "acescg", "--out", folder_ / "out"});
+  ASSERT_EQ(brass.exit_code, 0) << brass.err;
+  Decoder decoder;
+  std::string problem;
+  ASSERT_EQ(Decoder::Load(folder_ / "out/mosaic_brass", &decoder, &problem),
+            Decoder::LoadStatus::kOk)
+      << problem;
+  std::vector<float> values(decoder.channels().size());
+  decoder.Physical(0.3, 0.7, 0, values.data());
+  // The first row of the matrix from linear Rec.709 to AP1, to the digits it is published with.
+  EXPECT_NEAR(values[0], 0.6131 * 0.91 + 0.3395 * 0.78 + 0.0474 * 0.42, 2e-4);
+  // The factor of its base colour is not grey.
+  const Outcome wet = Bake({folder_ / "in/mosaic.gltf", "--material", "wet floor",
+                            "--working-space", "acescg", "--out", folder_ / "out"});
+  EXPECT_EQ(wet.exit_code, 3);
+  EXPECT_THAT(wet.err, HasSubstr("the factor of albedo has a colour"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/mosaic_wet_floor/current"));
+}
+
 TEST_F(Scenes, UnpackTheFinestMipThatIsStored) {
   const Outcome baked = Bake({folder_ / "in/mosaic.gltf", "--material", "floor", "--lod-range",
                               "2,4", "--out", folder_ / "out"});
