@@ -55,6 +55,7 @@ Json ConstantsOf(const Manifest& manifest) {
                          {"component", channel.component},
                          {"encoding", channel.encoding},
                          {"value", FloatAsWritten(channel.constant)}});
+    if (channel.scale != 1) constants.back()["scale"] = FloatAsWritten(channel.scale);
   }
   return constants;
 }

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -182,6 +183,26 @@ TEST_F(Scenes, BringTheirColoursToTheWorkingSpace) {
   EXPECT_EQ(wet.exit_code, 3);
   EXPECT_THAT(wet.err, HasSubstr("the factor of albedo has a colour"));
   EXPECT_FALSE(fs::exists(folder_ / "out/mosaic_wet_floor/current"));
+}
+
+TEST_F(Scenes, SayTheScaleOfConstantsThatAreLogarithms) {
+  std::vector<float> values;
+  for (int i = 0; i < 32 * 32; ++i) {
+    const float red = i == 500 ? 1e5f : 0.1f + 0.01f * static_cast<float>(i % 32);
+    values.insert(values.end(), {red, 3.5f, 0.2f});
+  }
+  ASSERT_TRUE(
+      WriteImage(folder_ / "in/glow.exr", WriteFormat::kExrFloat, 32, 32, 3, values.data()));
+  std::ofstream(folder_ / "in/glow.patina.json")
+      << R"({"version": 1, "materials": [{"name": "lamp", "maps": [{"role": "emissive", "file": "glow.exr"}]}]})";
+  const Outcome baked = Bake({folder_ / "in/glow.patina.json", "--out", folder_ / "out"});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  const Json constants = Read("out/glow.scene.json")["materials"][0]["constants"];
+  ASSERT_EQ(constants.size(), 2u) << constants;
+  ASSERT_EQ(constants[0]["encoding"], "signed_log");
+  const double scale = constants[0].value("scale", 1.0);
+  EXPECT_NEAR(scale * (std::exp2(constants[0]["value"].get<double>()) - 1), 3.5, 1e-4);
+  EXPECT_NE(scale, 1.0);
 }
 
 TEST_F(Scenes, UnpackTheFinestMipThatIsStored) {
