@@ -14,6 +14,7 @@
 #include <string>
 
 #include "formats/base/names.h"
+#include "formats/base/strict_json.h"
 
 namespace patina {
 
@@ -123,6 +124,24 @@ class JsonView {
     }
     for (size_t i = 0; i < value_->size(); ++i) {
       visit(JsonView(&(*value_)[i], pointer_ + "/" + std::to_string(i), problem_));
+    }
+  }
+
+  // Calls visit(const std::string& key, JsonView) for each member of an object, in order of keys.
+  template <class Visit>
+  void ForEachMember(size_t max_members, Visit&& visit) const {
+    if (value_ == nullptr) return;
+    if (!value_->is_object()) {
+      Wrong("an object");
+      return;
+    }
+    if (value_->size() > max_members) {
+      Report(pointer_, "an object of " + std::to_string(value_->size()) + " members, more than " +
+                           std::to_string(max_members));
+      return;
+    }
+    for (const auto& [key, member] : value_->items()) {
+      visit(key, JsonView(&member, pointer_ + "/" + EscapePointer(key), problem_));
     }
   }
 

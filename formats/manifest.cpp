@@ -152,6 +152,28 @@ ordered_json QualityToJson(const ManifestQuality& quality) {
   return json;
 }
 
+ordered_json ChoiceToJson(const ManifestChoice& choice) {
+  ordered_json json;
+  if (choice.target_psnr_db > 0) json["target_psnr_db"] = choice.target_psnr_db;
+  if (choice.most_bytes > 0) json["most_bytes"] = choice.most_bytes;
+  json["candidates"] = ordered_json::array();
+  for (const ManifestCandidate& candidate : choice.candidates) {
+    ordered_json entry;
+    entry["profile"] = candidate.profile;
+    entry["bytes"] = candidate.bytes;
+    if (candidate.reached_db) {
+      entry["reached_psnr_db"] = *candidate.reached_db;
+      entry["given_up"] = candidate.given_up;
+    }
+    json["candidates"].push_back(std::move(entry));
+  }
+  json["chosen"] = choice.chosen;
+  json["in_reach"] = choice.in_reach;
+  json["met"] = choice.met;
+  json["reason"] = choice.reason;
+  return json;
+}
+
 ordered_json TrainingToJson(const ManifestTraining& training) {
   ordered_json json;
   json["samples"] = training.samples;
@@ -165,8 +187,10 @@ ordered_json TrainingToJson(const ManifestTraining& training) {
     entry["samples"] = point.samples;
     entry["psnr_mip0_db"] = NullIfInfinite(point.psnr_mip0_db);
     entry["psnr_mean_mips_db"] = NullIfInfinite(point.psnr_mean_mips_db);
+    for (const auto& [map, db] : point.maps_db) entry["psnr_maps_db"][map] = NullIfInfinite(db);
     json["curve"].push_back(std::move(entry));
   }
+  if (training.choice) json["choice"] = ChoiceToJson(*training.choice);
   return json;
 }
 
@@ -363,6 +387,27 @@ ManifestQuality ReadQuality(const JsonView& json) {
   return quality;
 }
 
+ManifestChoice ReadChoice(const JsonView& json) {
+  ManifestChoice choice;
+  choice.target_psnr_db = json.Optional("target_psnr_db").Number();
+  choice.most_bytes = json.Optional("most_bytes").Unsigned();
+  json.Field("candidates").ForEach(kMaxEntries, [&](const JsonView& entry) {
+    ManifestCandidate candidate;
+    candidate.profile = entry.Field("profile").String();
+    candidate.bytes = entry.Field("bytes").Unsigned();
+    if (const JsonView reached = entry.Optional("reached_psnr_db")) {
+      candidate.reached_db = reached.Number();
+      candidate.given_up = entry.Optional("given_up").Bool();
+    }
+    choice.candidates.push_back(std::move(candidate));
+  });
+  choice.chosen = json.Field("chosen").String();
+  choice.in_reach = json.Field("in_reach").Bool();
+  choice.met = json.Field("met").Bool();
+  choice.reason = json.Field("reason").String();
+  return choice;
+}
+
 ManifestTraining ReadTraining(const JsonView& json) {
   ManifestTraining training;
   training.samples = json.Field("samples").Unsigned();
@@ -376,8 +421,14 @@ ManifestTraining ReadTraining(const JsonView& json) {
     point.samples = entry.Field("samples").Unsigned();
     point.psnr_mip0_db = entry.Field("psnr_mip0_db").NumberOrInfinity();
     point.psnr_mean_mips_db = entry.Field("psnr_mean_mips_db").NumberOrInfinity();
-    training.curve.push_back(point);
+    if (const JsonView maps = entry.Optional("psnr_maps_db")) {
+      maps.ForEachMember(kMaxEntries, [&](const std::string& map, const JsonView& db) {
+        point.maps_db[map] = db.NumberOrInfinity();
+      });
+    }
+    training.curve.push_back(std::move(point));
   });
+  if (const JsonView choice = json.Optional("choice")) training.choice = ReadChoice(choice);
   return training;
 }
 

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -154,6 +155,26 @@ struct ManifestCurvePoint {
   uint64_t samples = 0;
   double psnr_mip0_db = 0;
   double psnr_mean_mips_db = 0;
+  std::map<std::string, double> maps_db;  // of mip 0, learned channels only; empty before 0.2
+};
+
+// A profile that could have been chosen.
+struct ManifestCandidate {
+  std::string profile;
+  uint64_t bytes = 0;                 // for an engine to load
+  std::optional<double> reached_db;   // PSNR of mip 0 of one that was tried and was not enough
+  bool given_up = false;              // before the end of its training
+};
+
+// How the profile followed from what the job asked for.
+struct ManifestChoice {
+  double target_psnr_db = 0;  // of mip 0; 0: none
+  uint64_t most_bytes = 0;    // for an engine to load; 0: no limit
+  std::vector<ManifestCandidate> candidates;  // from the smallest to the largest
+  std::string chosen;
+  bool in_reach = true;  // before the training: whether what is asked for was expected
+  bool met = true;       // what the written files have of it
+  std::string reason;    // a sentence for people
 };
 
 struct ManifestTraining {
@@ -164,6 +185,7 @@ struct ManifestTraining {
   double float_psnr_mean_mips_db = 0;
   int rollbacks = 0;
   std::vector<ManifestCurvePoint> curve;
+  std::optional<ManifestChoice> choice;  // when the job asked for a quality or a size
 };
 
 // What an effect saved against learning it, computed from the model.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "formats/base/names.h"
+#include "formats/base/strict_json.h"
 #include "formats/dds.h"
 #include "formats/index_pack.h"
 #include "formats/manifest_json.h"
@@ -299,6 +300,25 @@ Status CheckQuality(const Manifest& manifest) {
   return {};
 }
 
+Status CheckChoice(const ManifestChoice& choice) {
+  const Pointer at = "/training/choice";
+  PATINA_TRY(NotEmpty(at + "/chosen", choice.chosen));
+  PATINA_TRY(NotEmpty(at + "/reason", choice.reason));
+  if (!(choice.target_psnr_db >= 0 && std::isfinite(choice.target_psnr_db)))
+    return Bad(at + "/target_psnr_db", "not a number of at least 0");
+  bool listed = false;
+  for (size_t i = 0; i < choice.candidates.size(); ++i) {
+    const ManifestCandidate& candidate = choice.candidates[i];
+    const Pointer here = at + "/candidates/" + std::to_string(i);
+    PATINA_TRY(NotEmpty(here + "/profile", candidate.profile));
+    if (candidate.reached_db && !std::isfinite(*candidate.reached_db))
+      return Bad(here + "/reached_psnr_db", "not a finite number");
+    listed |= candidate.profile == choice.chosen;
+  }
+  if (!listed) return Bad(at + "/chosen", "none of the candidates");
+  return {};
+}
+
 Status CheckTraining(const ManifestTraining& training) {
   PATINA_TRY(NotEmpty("/training/stopped_by", training.stopped_by));
   PATINA_TRY(Psnr("/training/float_psnr_db/mip0", training.float_psnr_mip0_db));
@@ -308,7 +328,10 @@ Status CheckTraining(const ManifestTraining& training) {
     const Pointer at = "/training/curve/" + std::to_string(i);
     PATINA_TRY(Psnr(at + "/psnr_mip0_db", training.curve[i].psnr_mip0_db));
     PATINA_TRY(Psnr(at + "/psnr_mean_mips_db", training.curve[i].psnr_mean_mips_db));
+    for (const auto& [map, db] : training.curve[i].maps_db)
+      PATINA_TRY(Psnr(at + "/psnr_maps_db/" + EscapePointer(map), db));
   }
+  if (training.choice) PATINA_TRY(CheckChoice(*training.choice));
   return {};
 }
 

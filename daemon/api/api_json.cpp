@@ -30,6 +30,7 @@ Json ProgressToJson(const JobProgress& progress) {
   if (progress.fraction >= 0) json["fraction"] = progress.fraction;
   if (progress.eta_s >= 0) json["eta_s"] = progress.eta_s;
   if (progress.psnr_db > 0) json["psnr_db"] = progress.psnr_db;
+  if (progress.gain_10s_db > 0) json["gain_10s_db"] = progress.gain_10s_db;
   SetText(&json, "message", progress.message);
   return json;
 }

@@ -221,6 +221,7 @@ void Scheduler::FollowEvents(Active* active, const std::vector<std::string>& lin
     progress->fraction = NumberOr(json, "fraction", -1);
     progress->eta_s = NumberOr(json, "eta_s", -1);
     progress->psnr_db = NumberOr(json, "psnr_db", 0);
+    progress->gain_10s_db = NumberOr(json, "gain_10s_db", 0);
     progress->message = ShortText(json, "message", 500);
   }
   if (!progress) return;
@@ -233,6 +234,7 @@ void Scheduler::FollowEvents(Active* active, const std::vector<std::string>& lin
   if (progress->fraction >= 0) data["fraction"] = progress->fraction;
   if (progress->eta_s >= 0) data["eta_s"] = progress->eta_s;
   if (progress->psnr_db > 0) data["psnr_db"] = progress->psnr_db;
+  if (progress->gain_10s_db > 0) data["gain_10s_db"] = progress->gain_10s_db;
   if (!progress->message.empty()) data["message"] = progress->message;
   parts_.events.Progress(
       id, parts_.clock.WallMs(),

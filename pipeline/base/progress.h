@@ -15,6 +15,7 @@ struct ProgressEvent {
   double samples = 0;       // training samples so far
   double samples_per_s = 0;
   double psnr_db = 0;       // quality so far on held-out samples; 0 if not measured yet
+  double gain_10s_db = 0;   // expected of the next 10 seconds, or of the rest of the stage; 0 if not known yet
   std::string message;      // free text for a person; may be empty
 };
 

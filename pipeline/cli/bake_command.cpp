@@ -41,6 +41,8 @@ std::string MapOptions(const JobOverrides& given) {
   add(given.address.has_value(), "--address");
   add(given.normal_convention.has_value(), "--normal-convention");
   add(given.target_psnr_db.has_value(), "--target-psnr");
+  add(given.target_bpp.has_value(), "--target-bpp");
+  add(given.size_budget_bytes.has_value(), "--size-budget");
   add(given.time_budget_s.has_value(), "--time-budget");
   add(given.samples.has_value(), "--samples");
   add(given.min_psnr_db.has_value(), "--min-psnr");
@@ -70,12 +72,18 @@ void Apply(const JobOverrides& overrides, Job* job) {
     }
     return;
   }
+  if (overrides.profile) job->choose_profile = *overrides.profile == "auto";
   Override(overrides.profile, ParseProfile, &job->profile);
+  const bool aims =
+      overrides.target_psnr_db || overrides.target_bpp || overrides.size_budget_bytes;
+  if (aims && !overrides.profile && job->profile == Job().profile) job->choose_profile = true;
   if (overrides.address) job->address_given = true;
   if (overrides.address)
     job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
   Override(overrides.normal_convention, &job->normal_convention);
   Override(overrides.target_psnr_db, &job->target_psnr_db);
+  Override(overrides.target_bpp, &job->target_bpp);
+  Override(overrides.size_budget_bytes, &job->size_budget_bytes);
   Override(overrides.time_budget_s, &job->time_budget_s);
   Override(overrides.samples, &job->samples);
   Override(overrides.min_psnr_db, &job->min_psnr_db);

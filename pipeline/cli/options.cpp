@@ -50,7 +50,8 @@ constexpr const char* kBakeFooter =
     "  patina bake library --out baked --quality preview --json\n"
     "  patina bake merl/*.binary brushed.bsdf --out baked\n"
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
-    "  patina bake wall --out baked --target-psnr 34 --time-budget 60 --min-psnr 30\n"
+    "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches it\n"
+    "  patina bake wall --out baked --size-budget 400k --time-budget 60\n"
     "\n"
     "The colour space of a colour map is what the map list says; else --color-space; else a word "
     "of "
@@ -118,14 +119,26 @@ void AddBake(CLI::App* app, CommandLine* line) {
       ->type_name("DIR");
   AddOverride(
       command, "--profile", &o.job.profile,
-      "[maps] Size of the feature textures: 1/4, 1/2 (default) or 1 x the side of the source")
-      ->check(CLI::IsMember({"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}));
+      "[maps] Size of the feature textures: 1/4, 1/2 (default) or 1 x the side of the source; auto "
+      "(default with a target or a size): the smallest that reaches the target, or the largest "
+      "that fits")
+      ->check(CLI::IsMember({"auto", "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}));
   AddOverride(command, "--quality", &o.job.quality, "How long to train (default standard)")
       ->check(CLI::IsMember({"preview", "standard", "reference"}));
   AddOverride(command, "--target-psnr", &o.job.target_psnr_db,
-              "[maps] Stop once the PSNR of mip 0 is there, in dB")
+              "[maps] PSNR of mip 0 that the files have to reach, in dB: stop once it is there; "
+              "publish nothing below it, and exit with 4")
       ->check(FiniteRange(0.0, 100.0))
       ->type_name("DB");
+  AddOverride(command, "--target-bpp", &o.job.target_bpp,
+              "[maps] Most bits for each texel of mip 0, of all that an engine loads")
+      ->check(FiniteRange(0.0, 1024.0))
+      ->type_name("BITS");
+  AddOverride(command, "--size-budget", &o.job.size_budget_bytes,
+              "[maps] Most bytes that an engine loads; 300k and 2M are understood")
+      ->transform(CLI::AsSizeValue(true))
+      ->check(CLI::Range(uint64_t{1}, kMaxSizeBudget))
+      ->type_name("BYTES");
   AddOverride(command, "--time-budget", &o.job.time_budget_s,
               "[maps] Aim to be done within so many seconds; the result then depends on the "
               "machine's speed")

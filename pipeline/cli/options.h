@@ -24,6 +24,8 @@ struct JobOverrides {
   std::optional<uint64_t> seed;
   std::optional<int> threads;
   std::optional<double> target_psnr_db;
+  std::optional<double> target_bpp;
+  std::optional<uint64_t> size_budget_bytes;
   std::optional<double> time_budget_s;
   std::optional<double> samples;
   std::optional<double> min_psnr_db;

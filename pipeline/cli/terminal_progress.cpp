@@ -46,7 +46,10 @@ std::string ProgressLine(const std::string& asset, const ProgressEvent& event) {
   std::string line = asset + ": " + event.stage;
   if (event.fraction >= 0) line += Format(" %.0f %%", 100 * std::min(1.0, event.fraction));
   if (event.samples_per_s > 0) line += Format(", %.1f M samples/s", event.samples_per_s / 1e6);
-  if (event.psnr_db > 0) line += Format(", %.1f dB", event.psnr_db);
+  if (event.psnr_db > 0) {
+    line += Format(", %.1f dB", event.psnr_db);
+    if (event.gain_10s_db >= 0.01) line += Format(" (+%.2f in 10 s)", event.gain_10s_db);
+  }
   if (event.eta_s >= 0) line += ", " + DurationText(event.eta_s) + " left";
   if (!event.message.empty()) line += ", " + event.message;
   return line;

@@ -71,7 +71,9 @@ std::string ProgressText(const Json& progress) {
   const double fraction = Number(progress, "fraction", -1);
   if (fraction >= 0) text += Format(" %.0f %%", 100 * std::min(1.0, fraction));
   const double psnr = Number(progress, "psnr_db", 0);
+  const double gain = Number(progress, "gain_10s_db", 0);
   if (psnr > 0) text += Format(", %.1f dB", psnr);
+  if (psnr > 0 && gain >= 0.01) text += Format(" (+%.2f in 10 s)", gain);
   const double eta = Number(progress, "eta_s", -1);
   if (eta >= 0) text += ", " + Duration(eta) + " left";
   return text;

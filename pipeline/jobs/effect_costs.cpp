@@ -2,27 +2,14 @@
 
 #include <algorithm>
 
+#include "formats/dds.h"
+
 namespace patina {
 namespace {
 
 constexpr uint64_t kBytesOfHalf = 2;
 // Forward, backward to the inputs of a layer, gradient of its weights.
 constexpr uint64_t kTrainPasses = 3;
-constexpr uint64_t kHeaderBytes = 148;  // of a DDS file
-
-uint64_t TextureBytes(const ModelShape& shape) {
-  uint64_t bytes = 0;
-  for (const FeatureShape& feature : shape) {
-    bytes += kHeaderBytes;
-    for (int level = 0; level < feature.levels; ++level) {
-      const auto blocks = [level](int side) {
-        return static_cast<uint64_t>(std::max(1, side >> level) + 3) / 4;
-      };
-      bytes += 16 * blocks(feature.width) * blocks(feature.height);
-    }
-  }
-  return bytes;
-}
 
 ManifestSavings SavedOutputs(int outputs, const TrainedMaterial* model) {
   const auto count = static_cast<uint64_t>(outputs);
@@ -68,6 +55,20 @@ ManifestSavings SavedMips(const Job& job, const SourceReference& reference,
 }
 
 }  // namespace
+
+uint64_t TextureBytes(const ModelShape& shape) {
+  uint64_t bytes = 0;
+  for (const FeatureShape& feature : shape) {
+    bytes += kDdsHeaderBytes;
+    for (int level = 0; level < feature.levels; ++level) {
+      const auto blocks = [level](int side) {
+        return static_cast<uint64_t>(std::max(1, side >> level) + 3) / 4;
+      };
+      bytes += sizeof(bc6h::Block) * blocks(feature.width) * blocks(feature.height);
+    }
+  }
+  return bytes;
+}
 
 std::vector<ManifestEffect> DescribeEffects(const Job& job, const SourceReference& reference,
                                             const TrainedMaterial* model) {

@@ -10,6 +10,9 @@
 
 namespace patina {
 
+// Bytes of the feature textures' files.
+uint64_t TextureBytes(const ModelShape& shape);
+
 // The reference's effects with what they saved. model: null when every channel is constant.
 //   bytes: rows of the network's last layer, levels of feature textures, that are not stored
 //   decode_multiply_adds: of one lookup

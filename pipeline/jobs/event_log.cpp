@@ -88,6 +88,7 @@ void EventLog::OnProgress(const ProgressEvent& event) {
   if (event.samples > 0) json["samples"] = event.samples;
   if (event.samples_per_s > 0) json["samples_per_s"] = event.samples_per_s;
   if (event.psnr_db > 0) json["psnr_db"] = event.psnr_db;
+  if (event.gain_10s_db > 0) json["gain_10s_db"] = event.gain_10s_db;
   if (!event.message.empty()) json["message"] = event.message;
   Write("progress", Members(json));
 }

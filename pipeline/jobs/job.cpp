@@ -248,6 +248,11 @@ void AssignEnum(const std::string& name, Parse parse, Enum* out) {
   if (auto value = parse(name)) *out = *value;
 }
 
+// Whether the job asks for a quality or a size that a profile can be chosen by.
+bool HasAims(const Job& job) {
+  return job.target_psnr_db > 0 || job.target_bpp > 0 || job.size_budget_bytes > 0;
+}
+
 // What is baked: a folder, a list of maps, or a material of a scene.
 void ReadSceneFields(ObjectReader* reader, Job* job) {
   const bool folder = reader->Find("folder") != nullptr, maps = reader->Find("maps") != nullptr;
@@ -310,10 +315,12 @@ void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems
   reader->Text("material", false, 255, &job->scene_material);
   ReadSceneFields(reader, job);
   std::string profile, address;
-  reader->Choice("profile", {"bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
+  reader->Choice("profile", {"auto", "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
   reader->Choice("address", {"wrap", "clamp"}, &address);
   reader->Choice("normal_convention", {"auto", "opengl", "directx"}, &job->normal_convention);
   reader->Number("target_psnr_db", 100, &job->target_psnr_db);
+  reader->Number("target_bpp", 1024, &job->target_bpp);
+  reader->Integer("size_budget_bytes", 0, kMaxSizeBudget, &job->size_budget_bytes);
   reader->Number("time_budget_s", 1e6, &job->time_budget_s);
   reader->Number("samples", 1e12, &job->samples);
   reader->Number("min_psnr_db", 100, &job->min_psnr_db);
@@ -327,6 +334,7 @@ void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems
   for (const char* key : {"file", "model"})
     reader->Refuse(key, "is a field of jobs of kind \"brdf\"; this job's kind is \"material\"");
   AssignEnum(profile, ParseProfile, &job->profile);
+  job->choose_profile = profile == "auto" || (profile.empty() && HasAims(*job));
   AssignEnum(working_space, ParseWorkingSpace, &job->working_space);
   job->address_given = !address.empty();
   if (address == "clamp") job->address = AddressMode::kClamp;
@@ -337,7 +345,8 @@ void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Jo
   if (const Json* model = reader->Find("model")) job->model = ReadModel(*model, problems);
   for (const char* key :
        {"folder", "set", "maps", "scene", "material", "effects", "constant_tolerance", "lod_range",
-        "profile", "address", "normal_convention", "target_psnr_db", "time_budget_s", "samples",
+        "profile", "address", "normal_convention", "target_psnr_db", "target_bpp",
+        "size_budget_bytes", "time_budget_s", "samples",
         "min_psnr_db", "repair_nonfinite", "toksvig", "working_space", "color_space", "ocio"}) {
     reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"brdf\"");
   }
@@ -523,12 +532,18 @@ std::string JobToJson(const Job& job) {
     json["maps"].push_back(std::move(entry));
   }
   json["out"] = job.out;
-  if (job.profile != defaults.profile) json["profile"] = ProfileName(job.profile);
+  if (job.choose_profile) {
+    json["profile"] = "auto";
+  } else if (job.profile != defaults.profile || HasAims(job)) {
+    json["profile"] = ProfileName(job.profile);
+  }
   if (job.quality != defaults.quality) json["quality"] = QualityName(job.quality);
   if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
   if (job.seed != defaults.seed) json["seed"] = job.seed;
   if (job.threads != defaults.threads) json["threads"] = job.threads;
   if (job.target_psnr_db > 0) json["target_psnr_db"] = job.target_psnr_db;
+  if (job.target_bpp > 0) json["target_bpp"] = job.target_bpp;
+  if (job.size_budget_bytes > 0) json["size_budget_bytes"] = job.size_budget_bytes;
   if (job.time_budget_s > 0) json["time_budget_s"] = job.time_budget_s;
   if (job.samples > 0) json["samples"] = job.samples;
   if (job.min_psnr_db > 0) json["min_psnr_db"] = job.min_psnr_db;
@@ -561,11 +576,13 @@ std::string CanonicalJob(const Job& job) {
                             {"convention", map.convention},
                             {"invert", map.invert}});
   }
-  json["profile"] = ProfileName(job.profile);
+  json["profile"] = job.choose_profile ? "auto" : ProfileName(job.profile);
   json["quality"] = QualityName(job.quality);
   json["recipe"] = RecipeName(job.recipe);
   json["seed"] = job.seed;
   json["target_psnr_db"] = job.target_psnr_db;
+  if (job.target_bpp > 0) json["target_bpp"] = job.target_bpp;
+  if (job.size_budget_bytes > 0) json["size_budget_bytes"] = job.size_budget_bytes;
   json["time_budget_s"] = job.time_budget_s;
   json["samples"] = job.samples;
   json["address"] = AddressModeName(job.address);

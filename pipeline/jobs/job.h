@@ -22,6 +22,7 @@ inline constexpr size_t kMaxJobMaps = 64;
 inline constexpr size_t kMaxColorSpaceName = 255;       // characters
 inline constexpr uint64_t kMaxSeed = 9007199254740991;  // 2^53 - 1, exact in every JSON reader
 inline constexpr int kMaxThreads = 256;
+inline constexpr uint64_t kMaxSizeBudget = uint64_t{1} << 40;
 
 // One entry of an explicit list of maps. Empty text means the default.
 struct JobMap {
@@ -67,13 +68,16 @@ struct Job {
                             // file's folder
   std::string out;
   Profile profile = Profile::kBcf1k;  // [material]
+  bool choose_profile = false;        // [material] in place of `profile`: see profile_choice.h
   Quality quality = Quality::kStandard;
   Recipe recipe = Recipe::kPatina;
   uint64_t seed = 1;
   int threads = 0;  // 0: one for each CPU this process may use
   // [material], all that follow.
-  double target_psnr_db = 0;  // 0: none
-  double time_budget_s = 0;   // 0: none
+  double target_psnr_db = 0;  // of mip 0, on the written files; 0: none
+  double target_bpp = 0;      // most bits a texel of mip 0 for an engine to load; 0: no limit
+  uint64_t size_budget_bytes = 0;  // most bytes for an engine to load; 0: no limit
+  double time_budget_s = 0;        // 0: none
   double samples = 0;         // 0: by quality and size
   double min_psnr_db = 0;     // 0: no gate
   AddressMode address = AddressMode::kWrap;

@@ -56,6 +56,7 @@ std::string JobResultToJson(const JobResult& result, int indent) {
   if (!result.stopped_by.empty()) {
     json["samples"] = result.samples;
     json["stopped_by"] = result.stopped_by;
+    if (!result.choice.empty()) json["choice"] = result.choice;
   }
   if (result.psnr || result.brdf) json["bytes"] = result.bytes;
   if (result.brdf) json["brdf"] = BrdfJson(*result.brdf);

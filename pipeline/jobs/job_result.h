@@ -58,6 +58,7 @@ struct JobResult {
   double cpu_seconds = 0;
   double samples = 0;
   std::string stopped_by;
+  std::string choice;  // why this profile, if the job asked for a quality or a size
   uint64_t bytes = 0;  // of what an engine loads
   std::optional<PsnrSummary> psnr;
   std::optional<double> ssim, flip, normal_angle_deg;

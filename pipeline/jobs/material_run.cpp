@@ -5,12 +5,14 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "formats/base/check.h"
 #include "formats/base/file_io.h"
 #include "pipeline/jobs/ingest.h"
 #include "pipeline/jobs/job_sets.h"
 #include "pipeline/jobs/measure.h"
 #include "pipeline/jobs/package.h"
 #include "pipeline/jobs/preview.h"
+#include "pipeline/jobs/profile_choice.h"
 #include "pipeline/jobs/report.h"
 #include "pipeline/jobs/scene_maps.h"
 #include "pipeline/jobs/staged_run.h"
@@ -28,9 +30,7 @@ class MaterialRun : public StagedRun {
  public:
   MaterialRun(const Job& job, JobObserver& observer, const CancelToken& cancel,
               const RunGuards& guards)
-      : StagedRun(job, observer, cancel, guards) {
-    result_.profile = ProfileName(job.profile);
-  }
+      : StagedRun(job, observer, cancel, guards), chosen_(job) {}
 
  private:
   Status RunStages() override {
@@ -39,12 +39,14 @@ class MaterialRun : public StagedRun {
     PATINA_TRY(Stage("reference", [this] { return BuildSource(); }));
     reading_input_ = false;
     if (FoundUnchanged()) return {};
-    PATINA_TRY(Stage("train", [this] { return Train(); }));
-    PATINA_TRY(Stage("package", [this] { return Package(); }));
-    PATINA_TRY(Stage("verify", [this] { return Verify(); }));
+    do {
+      PATINA_TRY(Stage("train", [this] { return Train(); }));
+      PATINA_TRY(Stage("package", [this] { return Package(); }));
+      PATINA_TRY(Stage("verify", [this] { return Verify(); }));
+    } while (TriesNextProfile(result_.psnr->mip0_db, false));
     PATINA_TRY(Stage("report", [this] { return Report(); }));
     return Stage("publish",
-                 [this] { return manifest_.quality.gate_met ? Publish(Curve()) : Reject(); });
+                 [this] { return WhatIsMissed().empty() ? Publish(Curve()) : Reject(); });
   }
 
   Status Ingest() {
@@ -83,13 +85,10 @@ class MaterialRun : public StagedRun {
     const MaterialReference& material = source_.reference.material;
     result_.stopped_by = "none";
     if (material.pyramid.channels == 0) return {};
-    TrainOptions options;
-    options.recipe = job_.recipe;
-    options.quality = job_.quality;
-    options.seed = job_.seed;
-    options.target_psnr_db = job_.target_psnr_db;
-    options.samples = job_.samples;
-    options.cancel = &cancel_;
+    if (!choice_) PATINA_TRY(Choose());
+    TrainOptions options = OptionsOfJob();
+    if (job_.target_psnr_db > 0)
+      options.target_psnr_db = std::max(1e-3, job_.target_psnr_db - ConstantsGainDb());
     if (job_.time_budget_s > 0) {
       // The budget is for the whole job: leave time for what follows the training.
       constexpr double kCpuSecondsPerTexelChannel = 1e-7;
@@ -98,16 +97,18 @@ class MaterialRun : public StagedRun {
                            static_cast<double>(material.channels.size()) / pool_->threads();
       options.time_budget_s = std::max(0.1, job_.time_budget_s - SecondsSoFar() - later);
     }
-    const std::vector<TargetLevel>& mips = material.pyramid.levels;
-    ModelShape shape = ShapeForProfile(job_.profile, mips[0].width, mips[0].height);
-    // Levels that only coarser mips would read are not stored.
-    for (FeatureShape& feature : shape) {
-      const int read = static_cast<int>(mips.size()) - feature.lod_shift;
-      feature.levels = std::clamp(read, 1, feature.levels);
-    }
-    PATINA_ASSIGN(TrainedMaterial model, TrainMaterial(material, shape, options, *pool_, sink_));
+    TrainedMaterial model;
+    do {
+      // The last one that fits is trained to the end: its container is kept for a look.
+      ManifestChoice after = choice_.value_or(ManifestChoice{});
+      options.give_up = MayTryMore() && ChooseNextProfile(0, true, &after);
+      PATINA_ASSIGN(model,
+                    TrainMaterial(material, ShapeOf(chosen_.profile), options, *pool_, sink_));
+    } while (model.stopped_by == "hopeless" &&
+             TriesNextProfile(model.curve.back().psnr_mip0_db + ConstantsGainDb(), true));
     result_.samples = model.samples;
     result_.stopped_by = model.stopped_by;
+    recording_seconds_ = model.recording_s;
     if (model.rollbacks > 0) {
       sink_.OnWarning("the training ran into values that are not finite and was set back " +
                       std::to_string(model.rollbacks) + " times; look at the preview");
@@ -116,9 +117,116 @@ class MaterialRun : public StagedRun {
     return {};
   }
 
+  TrainOptions OptionsOfJob() const {
+    TrainOptions options;
+    options.recipe = job_.recipe;
+    options.quality = job_.quality;
+    options.seed = job_.seed;
+    options.samples = job_.samples;
+    options.cancel = &cancel_;
+    return options;
+  }
+
+  ModelShape ShapeOf(Profile profile) const {
+    const std::vector<TargetLevel>& mips = source_.reference.material.pyramid.levels;
+    return ShapeOfMips(profile, mips[0].width, mips[0].height, static_cast<int>(mips.size()));
+  }
+
+  // The trainer measures the channels that it learns; on files, those that cost nothing count too.
+  double ConstantsGainDb() const {
+    double all = 0, learned = 0;
+    for (const TargetChannel& channel : source_.reference.material.channels) {
+      all += channel.encoding == Encoding::kNormalXy ? 1.5 : 1;  // z stands for half of x and of y
+      learned += channel.constant ? 0 : 1;
+    }
+    return 10 * std::log10(all / learned);
+  }
+
+  // The profile, if the job leaves it open, and whether what it asks for is in reach.
+  Status Choose() {
+    choice_.emplace();
+    chosen_.choose_profile = false;
+    const MaterialReference& material = source_.reference.material;
+    const Aims aims = AimsOfJob(job_, source_.reference.width, source_.reference.height);
+    if (aims.target_psnr_db == 0 && aims.most_bytes == 0) {
+      choice_.reset();
+      return {};
+    }
+    std::vector<ProfileSizes> candidates;
+    for (const Profile profile :
+         {Profile::kBcf05k, Profile::kBcf1k, Profile::kBcf2k, Profile::kBcf2kPlus}) {
+      if (job_.choose_profile || profile == job_.profile)
+        candidates.push_back({profile, MaterialBytes(ShapeOf(profile), material.pyramid.channels)});
+    }
+    // Trying one after the other takes time, which a budget does not leave.
+    const bool smallest_first = aims.target_psnr_db > 0 && job_.time_budget_s == 0;
+    *choice_ = ChooseProfile(aims, candidates, smallest_first);
+    PATINA_ASSIGN(chosen_.profile, ParseProfile(choice_->chosen));
+    const std::string said =
+        std::string(choice_->in_reach ? "" : "not in reach: ") + choice_->reason;
+    choice_->in_reach ? observer_.OnNote("chosen", said) : sink_.OnWarning(said);
+    return {};
+  }
+
+  bool MayTryMore() const {
+    return choice_ && job_.choose_profile && choice_->in_reach && job_.target_psnr_db > 0 &&
+           job_.time_budget_s == 0;
+  }
+
+  // Whether another profile is to be tried in place of the one that missed.
+  bool TriesNextProfile(double reached_db, bool given_up) {
+    if (!MayTryMore() || reached_db >= job_.target_psnr_db ||
+        !ChooseNextProfile(reached_db, given_up, &*choice_)) {
+      return false;
+    }
+    observer_.OnNote("chosen", choice_->reason);
+    const auto profile = ParseProfile(choice_->chosen);
+    PATINA_CHECK(profile);
+    chosen_.profile = *profile;
+    return true;
+  }
+
+  // What the job asks for and the written files do not have, for a message; empty if nothing.
+  std::string WhatIsMissed() const {
+    std::string missed;
+    const auto add = [&missed](const std::string& text) {
+      missed += (missed.empty() ? "" : "; ") + text;
+    };
+    if (!manifest_.quality.gate_met) {
+      add("the overall PSNR is " + Decimals(2, result_.psnr->overall_db) +
+          " dB, below the gate of " + Decimals(2, job_.min_psnr_db) +
+          " dB; try a higher --quality or a larger --profile");
+    }
+    if (!choice_) return missed;
+    if (MissesTarget()) {
+      add("mip 0 has " + Decimals(2, result_.psnr->mip0_db) + " dB of the " +
+          Decimals(2, job_.target_psnr_db) + " dB asked for" + " with " + choice_->chosen +
+          (&choice_->candidates.back() != &choice_->candidates.front() &&
+                   choice_->candidates.back().profile == choice_->chosen
+               ? ", the largest profile"
+               : "") +
+          "; try a higher --quality, a larger --profile, more time or a lower target");
+    }
+    if (MissesSize()) add(choice_->reason);
+    return missed;
+  }
+
+  bool MissesTarget() const {
+    return choice_ && job_.target_psnr_db > 0 && result_.psnr->mip0_db < job_.target_psnr_db;
+  }
+  bool MissesSize() const {
+    return choice_ && choice_->most_bytes > 0 && result_.bytes > choice_->most_bytes;
+  }
+
   Status Package() {
+    // Of a profile that was tried before nothing stays.
+    if (!staging_->payloads().empty()) {
+      staging_.reset();
+      PATINA_TRY(OpenStaging());
+    }
     if (model_) PATINA_TRY(AddModel(*model_, &*staging_));
-    manifest_ = DescribeContainer(job_, source_, model_ ? &*model_ : nullptr);
+    manifest_ = DescribeContainer(chosen_, source_, model_ ? &*model_ : nullptr);
+    result_.profile = manifest_.profile;
     result_.bytes = ModelBytes(staging_->payloads());
     // Complete but for its quality, so that the decoder can open what was written.
     return staging_->WriteManifest(manifest_);
@@ -136,6 +244,11 @@ class MaterialRun : public StagedRun {
       return Fail(ErrorCode::kInternal, "the measured quality is not a number");
     }
     DescribeQuality(job_, measurement_, &manifest_);
+    if (choice_) {
+      choice_->met = !MissesTarget() && !MissesSize();
+      manifest_.training.choice = choice_;
+      result_.choice = choice_->reason;
+    }
     return {};
   }
 
@@ -165,11 +278,9 @@ class MaterialRun : public StagedRun {
       return FailErrno(error.value(), "cannot keep the rejected container as", rejected.string());
     result_.container = rejected.string();
     result_.exit_code = kExitQualityGate;
-    return Fail(ErrorCode::kOutOfRange,
-                "the overall PSNR is " + Decimals(2, result_.psnr->overall_db) +
-                    " dB, below the gate of " + Decimals(2, job_.min_psnr_db) +
-                    " dB; nothing was published, the result is kept in " + result_.container +
-                    "; try a higher --quality or a larger --profile");
+    return Fail(
+        ErrorCode::kOutOfRange,
+        WhatIsMissed() + "; nothing was published, the result is kept in " + result_.container);
   }
 
   std::vector<RunCurvePoint> Curve() const {
@@ -181,10 +292,14 @@ class MaterialRun : public StagedRun {
                        {{"cpu_seconds", point.cpu_s},
                         {"psnr_mip0_db", point.psnr_mip0_db},
                         {"psnr_mean_mips_db", point.psnr_mean_mips_db}}});
+      for (const auto& [map, db] : MapsOfPoint(source_.reference.material, point))
+        curve.back().measures.emplace_back("psnr_" + map + "_db", db);
     }
     return curve;
   }
 
+  Job chosen_;                            // the job with the profile that was chosen
+  std::optional<ManifestChoice> choice_;  // when the job asks for a quality or a size
   JobMaps maps_;
   JobSource source_;
   std::optional<TrainedMaterial> model_;

@@ -1,12 +1,14 @@
 #include "pipeline/jobs/package.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "formats/base/names.h"
 #include "formats/dds.h"
 #include "formats/weights.h"
 #include "pipeline/jobs/effect_costs.h"
+#include "pipeline/material/trainer.h"
 
 namespace patina {
 namespace {
@@ -43,11 +45,12 @@ ManifestSource DescribeSource(const JobSource& source) {
   return described;
 }
 
-void DescribeModel(const TrainedMaterial& model, int first_mip, Manifest* manifest) {
+void DescribeModel(const TrainedMaterial& model, const MaterialReference& reference,
+                   Manifest* manifest) {
   for (int t = 0; t < kFeatureTextures; ++t) {
     const FeatureShape& shape = model.shape[static_cast<size_t>(t)];
     manifest->features.push_back({FeatureName(t), shape.width, shape.height, shape.levels,
-                                  -shape.lod_shift - first_mip, "BC6H_UF16"});
+                                  -shape.lod_shift - reference.pyramid.first_mip, "BC6H_UF16"});
   }
   ManifestNetwork network;
   network.payload = kWeightsName;
@@ -63,7 +66,8 @@ void DescribeModel(const TrainedMaterial& model, int first_mip, Manifest* manife
   for (const CurvePoint& point : model.curve) {
     manifest->training.curve.push_back({static_cast<uint64_t>(point.samples),
                                         CapPsnr(point.psnr_mip0_db),
-                                        CapPsnr(point.psnr_mean_mips_db)});
+                                        CapPsnr(point.psnr_mean_mips_db),
+                                        MapsOfPoint(reference, point)});
   }
 }
 
@@ -122,8 +126,7 @@ Manifest DescribeContainer(const Job& job, const JobSource& source, const Traine
   manifest.quality_setting = QualityName(job.quality);
   manifest.source = DescribeSource(source);
   manifest.training.stopped_by = "none";
-  if (model != nullptr)
-    DescribeModel(*model, source.reference.material.pyramid.first_mip, &manifest);
+  if (model != nullptr) DescribeModel(*model, source.reference.material, &manifest);
   for (const TargetChannel& channel : source.reference.material.channels) {
     ManifestChannel entry;
     entry.map = channel.map;
@@ -191,6 +194,21 @@ void DescribeQuality(const Job& job, const Measurement& measurement, Manifest* m
     quality.gate_met = psnr.overall_db >= job.min_psnr_db;
   }
   manifest->quality = std::move(quality);
+}
+
+std::map<std::string, double> MapsOfPoint(const MaterialReference& reference,
+                                          const CurvePoint& point) {
+  std::map<std::string, std::pair<double, int>> errors;  // sum of squares, channels
+  for (const TargetChannel& channel : reference.channels) {
+    const auto output = static_cast<size_t>(channel.learned_index);
+    if (channel.learned_index < 0 || output >= point.psnr_channels_db.size()) continue;
+    auto& [sum, channels] = errors[channel.map];
+    sum += std::pow(10, -0.1 * point.psnr_channels_db[output]);
+    ++channels;
+  }
+  std::map<std::string, double> maps;
+  for (const auto& [map, error] : errors) maps[map] = PsnrOfMse(error.first / error.second);
+  return maps;
 }
 
 uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads) {

@@ -1,6 +1,8 @@
 // From a trained material to the payloads and the manifest of a container.
 #pragma once
 
+#include <map>
+
 #include "formats/base/result.h"
 #include "formats/container.h"
 #include "formats/manifest.h"
@@ -31,6 +33,10 @@ Status AsInternal(Status status);
 
 // Bytes of the payloads that an engine loads: feature textures, index grid, codebook, weights,
 // sampler.
+// PSNR of mip 0 at a point of the training, by map, learned channels only, in dB.
+std::map<std::string, double> MapsOfPoint(const MaterialReference& reference,
+                                          const CurvePoint& point);
+
 uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads);
 
 }  // namespace patina

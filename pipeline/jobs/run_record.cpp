@@ -25,6 +25,7 @@ std::string RunRecordToJson(const RunRecord& record) {
     json["stages"].push_back(
         {{"stage", stage.stage}, {"seconds", stage.seconds}, {"cpu_seconds", stage.cpu_seconds}});
   }
+  json["recording_seconds"] = record.recording_seconds;
   json["curve"] = Json::array();
   for (const RunCurvePoint& point : record.curve) {
     Json entry{{"samples", point.samples}, {"seconds", point.seconds}};

@@ -19,7 +19,7 @@ struct StageCost {
 struct RunCurvePoint {
   double samples = 0;
   double seconds = 0;  // from the start of the training
-  std::vector<std::pair<const char*, double>> measures;
+  std::vector<std::pair<std::string, double>> measures;
 };
 
 struct RunRecord {
@@ -36,6 +36,7 @@ struct RunRecord {
   double samples = 0;
   double samples_per_s = 0;  // of the train stage as a whole
   std::vector<StageCost> stages;
+  double recording_seconds = 0;  // of the training, to measure the curve
   std::vector<RunCurvePoint> curve;
 };
 

@@ -147,6 +147,7 @@ Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {
       record.samples_per_s = result_.samples / stage.seconds;
   }
   record.stages = stages_;
+  record.recording_seconds = recording_seconds_;
   record.curve = std::move(curve);
   const std::string text = RunRecordToJson(record);
   return staging_->AddUnlisted("run.json", AsBytes(text));

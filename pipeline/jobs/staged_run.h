@@ -85,6 +85,7 @@ class StagedRun {
   std::optional<ThreadPool> pool_;
   Manifest manifest_;
   RunGuards guards_;
+  double recording_seconds_ = 0;  // of the training, to measure the curve
 
  private:
   using Clock = std::chrono::steady_clock;

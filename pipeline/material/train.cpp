@@ -11,6 +11,7 @@
 #include "pipeline/material/channel_stats.h"
 #include "pipeline/material/exporter.h"
 #include "pipeline/material/feature_init.h"
+#include "pipeline/material/quality_trend.h"
 #include "pipeline/material/trainer.h"
 
 namespace patina {
@@ -77,6 +78,7 @@ class Schedule {
   // At checkpoints: the quality so far. Ends early with what is left of the falling rates.
   void Observe(double samples, double psnr_mip0_db) {
     if (ending_) return;
+    outlook_db_ = psnr_mip0_db + GainToCome(std::clamp(progress_, 1e-3, 1.0));
     if (options_.target_psnr_db > 0 && psnr_mip0_db >= options_.target_psnr_db + kTargetMarginDb) {
       End(samples, "target");
     } else if (options_.quality == Quality::kReference && options_.samples == 0 && last_samples_ > 0) {
@@ -86,6 +88,10 @@ class Schedule {
     last_samples_ = samples;
     last_psnr_db_ = psnr_mip0_db;
   }
+
+  // What the training may reach at best; below the target it is out of reach.
+  double outlook_db() const { return outlook_db_; }
+  bool hopeless() const { return !ending_ && outlook_db_ < options_.target_psnr_db; }
 
   const char* stopped_by() const { return stopped_by_; }
 
@@ -105,6 +111,7 @@ class Schedule {
   double end_;
   double train_s_ = 0;
   double progress_ = 0;
+  double outlook_db_ = 1e9;
   bool ending_ = false;
   double last_samples_ = 0, last_psnr_db_ = 0;
   const char* stopped_by_ = "budget";
@@ -159,10 +166,26 @@ class Session {
     event.samples_per_s = event.samples / std::max(1e-3, event.elapsed_s);
     event.eta_s = event.fraction > 0.01 ? event.elapsed_s * (1 - event.fraction) / event.fraction : -1;
     event.psnr_db = PsnrOfMse(trainer->TakeRunningError());
+    trend_.Add(event.elapsed_s, event.psnr_db);
+    event.gain_10s_db = trend_.GainWithin(std::min(10.0, event.eta_s > 0 ? event.eta_s : 10.0));
     progress_.OnProgress(event);
   }
 
+  // Once, and early: the training goes on.
+  void SayHopeless(double progress, double outlook_db) {
+    if (said_hopeless_) return;
+    said_hopeless_ = true;
+    char text[240];
+    std::snprintf(text, sizeof text,
+                  "the target is out of reach: after %.0f %% of the training at most %.1f dB can be expected of the %.1f dB it "
+                  "takes; it goes on to the best there is; needed: a larger --profile, a higher --quality, more time, or a "
+                  "lower target",
+                  100 * progress, outlook_db, options_.target_psnr_db);
+    progress_.OnWarning(text);
+  }
+
   double Record(Trainer* trainer, FeatureStore* store, const float* network) {
+    const Clock::time_point begin = Clock::now();
     const ModelError error = trainer->Evaluate(store, network, 0);
     CurvePoint point;
     point.samples = trainer->samples();
@@ -170,7 +193,9 @@ class Session {
     point.cpu_s = CpuSeconds() - start_cpu_;
     point.psnr_mip0_db = error.MipPsnr(0);
     point.psnr_mean_mips_db = error.MeanMipsPsnr();
+    for (const double mse : error.mip_mse[0]) point.psnr_channels_db.push_back(PsnrOfMse(mse));
     result_->curve.push_back(point);
+    result_->recording_s += SecondsSince(begin);
     return point.psnr_mip0_db;
   }
 
@@ -181,6 +206,8 @@ class Session {
   Clock::time_point start_;
   Clock::time_point last_report_{};
   double start_cpu_;
+  bool said_hopeless_ = false;
+  QualityTrend trend_;
 };
 
 constexpr int kOffGridWindows = 64;
@@ -283,6 +310,13 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
     if (progress >= next_record) {
       schedule.Observe(trainer.samples(), session->Record(&trainer, &store, network.raw()));
       next_record *= checkpoint_growth;
+      if (schedule.hopeless()) {
+        if (options.give_up) {
+          result->stopped_by = "hopeless";
+          return;
+        }
+        session->SayHopeless(progress, schedule.outlook_db());
+      }
     }
     session->Report(&trainer, progress);
   }
@@ -364,7 +398,15 @@ void TrainPaper(const MaterialReference& reference, const MaterialKernels& kerne
   FinishNetwork(reference, kernels, pool, options, draw, windows_per_batch, kTune * budget, 1e-3, 0, &exporter, &network, result);
 }
 
+Status CheckOutputs(int outputs) {
+  if (outputs >= 1 && outputs <= kMaxOutputs) return {};
+  return Fail(ErrorCode::kInvalidArgument, "a material needs 1 to " + std::to_string(kMaxOutputs) +
+                                               " channels that vary to be trained, this one has " + std::to_string(outputs));
+}
+
 }  // namespace
+
+double GainToCome(double progress) { return progress < 1 ? 1 + 1.9 * std::log2(1 / progress) : 0; }
 
 double SampleBudget(const MaterialReference& reference, const TrainOptions& options) {
   if (options.samples > 0) return options.samples;
@@ -377,10 +419,7 @@ Result<TrainedMaterial> TrainMaterial(const MaterialReference& reference, const 
                                       const TrainOptions& options, ThreadPool& pool, ProgressSink& progress) {
   PATINA_ASSIGN(const SimdTarget target, ActiveSimdTarget());
   const int outputs = reference.pyramid.channels;
-  if (outputs < 1 || outputs > kMaxOutputs) {
-    return Fail(ErrorCode::kInvalidArgument, "a material needs 1 to " + std::to_string(kMaxOutputs) +
-                                                 " channels that vary to be trained, this one has " + std::to_string(outputs));
-  }
+  PATINA_TRY(CheckOutputs(outputs));
   TrainedMaterial result;
   result.shape = shape;
   result.outputs = outputs;
@@ -392,6 +431,7 @@ Result<TrainedMaterial> TrainMaterial(const MaterialReference& reference, const 
     TrainPatina(reference, KernelsFor(target), options, budget, pool, &session, &result);
   }
   if (session.cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
+  if (result.stopped_by == "hopeless") return result;
   for (const auto* weights : {&result.w1, &result.b1, &result.w2, &result.b2}) {
     for (const float w : *weights) {
       if (std::isfinite(w)) continue;

@@ -52,6 +52,7 @@ struct TrainOptions {
   uint64_t seed = 1;
   double time_budget_s = 0;     // 0: none. Stops early enough to export within it; not reproducible to the byte
   double target_psnr_db = 0;    // 0: none. Stops once the held-out PSNR of mip 0 is there
+  bool give_up = false;         // ends without a model (stopped_by "hopeless") once the target is out of reach: see GainToCome
   double samples = 0;           // 0: by quality and size. Otherwise train with exactly this many (rounded up to a step)
   const CancelToken* cancel = nullptr;
 };
@@ -63,6 +64,7 @@ struct CurvePoint {
   double cpu_s = 0;
   double psnr_mip0_db = 0;       // learned channels, coded values
   double psnr_mean_mips_db = 0;  // mean over mips of the per-mip PSNR
+  std::vector<double> psnr_channels_db;  // [learned channel], of mip 0
 };
 
 struct TrainedMaterial {
@@ -74,7 +76,7 @@ struct TrainedMaterial {
   // coded values: the normalisation of the training is folded in.
   std::vector<float> w1, b1, w2, b2;
   double samples = 0;
-  std::string stopped_by;  // "budget", "slope", "target", "time"
+  std::string stopped_by;  // "budget", "slope", "target", "time"; "hopeless": there are no blocks and no weights
   std::vector<CurvePoint> curve;
   // The trainer's own float model (before BC6H and half rounding) and the exported one (exact decode of the blocks, half
   // weights) by one measure: learned channels, unclamped coded values; all texel centres, and 64 windows of samples at random
@@ -87,7 +89,13 @@ struct TrainedMaterial {
   double exported_psnr_off_grid_db = 0;
   std::vector<double> float_psnr_mips_db, exported_psnr_mips_db;  // per mip of the source
   int rollbacks = 0;  // training steps undone because a value was not finite
+  double recording_s = 0;  // wall seconds that measuring the curve took
 };
+
+// What a training that is done to `progress` (above 0, at most 1) may still add to the PSNR of mip 0, in dB: a bound that
+// nearly all materials keep. Of 137 trainings of all real sets the most was 7.7 dB at 1/16, 6.9 at 1/8, 5.1 at 1/4, 3.8 at 1/2
+// (all of hard-edged charts; the median 2.2, 1.6, 1.1, 0.5).
+double GainToCome(double progress);
 
 // The samples that the options ask for at most.
 double SampleBudget(const MaterialReference& reference, const TrainOptions& options);

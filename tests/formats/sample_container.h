@@ -73,7 +73,16 @@ inline Manifest FullManifest() {
   manifest.training.float_psnr_mip0_db = 30.75;
   manifest.training.float_psnr_mean_mips_db = 36.875;
   manifest.training.rollbacks = 1;
-  manifest.training.curve = {{1000000, 25.5, 30.25}, {400000000, 30.75, 36.875}};
+  manifest.training.curve = {{1000000, 25.5, 30.25, {{"albedo", 26.5}, {"normal", 24.5}}},
+                             {400000000, 30.75, 36.875, {{"albedo", 31.5}, {"normal", INFINITY}}}};
+  manifest.training.choice =
+      ManifestChoice{30.5,
+                     3000000,
+                     {{"bcf-0.5k", 117872, 26.25, true}, {"bcf-1k", 466032, std::nullopt, false}},
+                     "bcf-1k",
+                     true,
+                     true,
+                     "bcf-1k is the smallest that is left"};
   manifest.effects = {{"albedo.b", "constant", "constant 0.25", ManifestSavings{34, 16, 0, 4800}},
                       {"albedo.r", "learned", "", std::nullopt}};
   manifest.warnings = {"readme.tif was not recognised"};

@@ -355,6 +355,8 @@ TEST(JobSchema, AgreesWithTheParser) {
                           "seed",
                           "threads",
                           "target_psnr_db",
+                          "target_bpp",
+                          "size_budget_bytes",
                           "time_budget_s",
                           "samples",
                           "min_psnr_db",
@@ -421,7 +423,8 @@ TEST(CanonicalJob, LeavesOutWhatDoesNotChangeTheBytes) {
         +[](Job* j) { j->recipe = Recipe::kPaper; },
         +[](Job* j) { j->address = AddressMode::kClamp; }, +[](Job* j) { j->toksvig = false; },
         +[](Job* j) { j->samples = 5; }, +[](Job* j) { j->normal_convention = "directx"; },
-        +[](Job* j) { j->target_psnr_db = 5; }, +[](Job* j) { j->time_budget_s = 5; },
+        +[](Job* j) { j->target_psnr_db = 5; }, +[](Job* j) { j->target_bpp = 5; },
+        +[](Job* j) { j->size_budget_bytes = 5; }, +[](Job* j) { j->choose_profile = true; }, +[](Job* j) { j->time_budget_s = 5; },
         +[](Job* j) { j->repair_nonfinite = true; }, +[](Job* j) { j->asset = "wall"; },
         +[](Job* j) {
           j->maps.push_back({"ao", "f.png", "r", "auto", "auto", false});

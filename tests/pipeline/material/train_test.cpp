@@ -228,6 +228,50 @@ TEST(Train, RefusesWhatHalfWeightsCannotHold) {
   EXPECT_EQ(result.error().code, ErrorCode::kOutOfRange);
 }
 
+TEST(Train, GivesUpOnATargetOutOfReach) {
+  const auto reference = MakeReference(64, 64, 3, AddressMode::kWrap, Waves);
+  ThreadPool pool(2);
+  TrainOptions options = Samples(1e6);
+  options.target_psnr_db = 90;
+  options.give_up = true;
+  const auto result = TrainMaterial(reference, ShapeForProfile(Profile::kBcf05k, 64, 64), options, pool, NoProgress());
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->stopped_by, "hopeless");
+  EXPECT_LT(result->samples + result->curve.back().samples, 1e6);
+  EXPECT_TRUE(result->blocks[0].empty());
+  EXPECT_LT(result->curve.back().psnr_mip0_db + GainToCome(1.0 / 16), 90);
+}
+
+TEST(Train, SaysThatATargetIsOutOfReachAndGoesOn) {
+  const auto reference = MakeReference(64, 64, 3, AddressMode::kWrap, Waves);
+  ThreadPool pool(2);
+  struct Warnings : ProgressSink {
+    void OnProgress(const ProgressEvent&) override {}
+    void OnWarning(const std::string& message) override { said.push_back(message); }
+    std::vector<std::string> said;
+  } sink;
+  TrainOptions options = Samples(1e6);
+  options.target_psnr_db = 90;
+  const auto result = TrainMaterial(reference, ShapeForProfile(Profile::kBcf05k, 64, 64), options, pool, sink);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->stopped_by, "budget");
+  ASSERT_EQ(sink.said.size(), 1u);
+  EXPECT_NE(sink.said[0].find("out of reach"), std::string::npos);
+  EXPECT_FALSE(result->blocks[0].empty());
+}
+
+TEST(Train, RecordsTheAccuracyOfEachChannel) {
+  const auto reference = MakeReference(32, 32, 3, AddressMode::kWrap, Waves);
+  const TrainedMaterial result = MustTrain(reference, Samples(2e5), 1);
+  ASSERT_GE(result.curve.size(), 3u);
+  for (const CurvePoint& point : result.curve) {
+    ASSERT_EQ(point.psnr_channels_db.size(), 3u);
+    double mse = 0;
+    for (const double db : point.psnr_channels_db) mse += std::pow(10, -0.1 * db) / 3;
+    EXPECT_NEAR(-10 * std::log10(mse), point.psnr_mip0_db, 1e-6);
+  }
+}
+
 TEST(Train, StopsWhenCancelled) {
   const auto reference = MakeReference(64, 64, 3, AddressMode::kWrap, Waves);
   ThreadPool pool(2);
