@@ -71,6 +71,7 @@ struct Job {
   Recipe recipe = Recipe::kPatina;
   uint64_t seed = 1;
   int threads = 0;  // 0: one for each CPU this process may use
+  bool report = true;  // write report.html beside the manifest; no part of the fingerprint
   // [material], all that follow.
   double target_psnr_db = 0;  // 0: none
   double time_budget_s = 0;   // 0: none
