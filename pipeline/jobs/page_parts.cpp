@@ -114,7 +114,7 @@ std::string StopText(const std::string& stopped_by) {
   if (stopped_by == "budget") return "it had drawn the samples that this quality stands for";
   if (stopped_by == "slope") return "it had stopped getting better";
   if (stopped_by == "target") return "it had reached its target";
-  if (stopped_by == "time") return "its time was up";
+  if (stopped_by == "time") return "its schedule followed the time budget";
   if (stopped_by == "none") return "nothing had to be learned";
   return Spaced(stopped_by);
 }

@@ -25,7 +25,11 @@ size_t CharacterLength(std::string_view text, size_t at) {
   const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
   const bool noncharacter = (code & 0xFFFE) == 0xFFFE;
   const bool control = code < 0xA0;  // C1
-  if (code < kLeast[length] || code > 0x10FFFF || surrogate || noncharacter || control) return 0;
+  // What turns the direction of the text after it: a name could make a sentence of ours say
+  // something else.
+  const bool turns = (code >= 0x202A && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
+  if (code < kLeast[length] || code > 0x10FFFF || surrogate || noncharacter || control || turns)
+    return 0;
   return length;
 }
 

@@ -10,7 +10,8 @@
 namespace patina {
 
 // The text for the content of an element or a quoted attribute: & < > " ' as references; control
-// characters, which XML has no way to write, and bytes that are not UTF-8 as U+FFFD.
+// characters, which XML has no way to write, marks that turn the direction of text, and bytes that
+// are not UTF-8 as U+FFFD.
 std::string EscapeHtml(std::string_view text);
 
 struct HtmlAttribute {

@@ -11,7 +11,7 @@ namespace patina {
 namespace {
 
 constexpr double kWidth = 600, kHeight = 330;
-constexpr double kLeft = 58, kRight = 18, kTop = 14, kBottom = 50;
+constexpr double kLeft = 76, kRight = 18, kTop = 14, kBottom = 50;
 constexpr double kLabelHeight = 17;
 constexpr double kPointRadius = 4;
 constexpr size_t kColors = 6;  // of the style sheet: c0 to c5

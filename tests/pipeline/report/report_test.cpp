@@ -63,6 +63,12 @@ TEST(EscapeHtml, LeavesNoWayOutOfTextAndAttributes) {
             "a\tb\nc \xC3\xA9 \xE2\x82\xAC \xF0\x9F\x8E\xA8");
 }
 
+TEST(EscapeHtml, ReplacesWhatTurnsText) {
+  for (const char* mark : {"\xE2\x80\xAA", "\xE2\x80\xAE", "\xE2\x81\xA6", "\xE2\x81\xA9"})
+    EXPECT_THAT(EscapeHtml(std::string(mark) + "gnp.exe"), testing::EndsWith(kReplaced + "gnp.exe"));
+  EXPECT_EQ(EscapeHtml("\xD7\xA9"), "\xD7\xA9");  // letters may run from right to left
+}
+
 TEST(EscapeHtml, ReplacesWhatXmlCannotHold) {
   for (const char* bad : {"\x01", "\x1B", "\r", "\x7F", "\x80", "\xC3", "\xC0", "\xFF"})
     EXPECT_EQ(EscapeHtml(std::string("a") + bad), "a" + kReplaced) << std::hex << int(*bad);
