@@ -4,7 +4,8 @@
 usage: report_browser_test.py FOLDER
 
 For each *.html in FOLDER: fails on an error in the browser's console, on a request for anything that is not part of the
-page, on a picture that does not load, and on content wider than the screen. Leaves a screenshot of each view beside it.
+page, on a picture that does not load, on content wider than the screen, and on a source that does not come to lie over
+a decoded picture in focus. Leaves a screenshot of each view beside it.
 Exits with 77, saying so, where there is no Chromium.
 """
 
@@ -27,6 +28,15 @@ LOOK = """(() => ({
   height: document.documentElement.scrollHeight,
   broken: [...document.images].filter(image => !image.complete || image.naturalWidth === 0).map(image => image.alt),
   images: document.images.length,
+  flip: (() => {
+    const row = [...document.querySelectorAll('.row')].find(row => row.querySelector('.source img'));
+    if (!row) return 0;
+    const [source, decoded] = [row.querySelector('.source img'), row.querySelector('.decoded img')];
+    decoded.focus({preventScroll: true});
+    const [a, b] = [source.getBoundingClientRect(), decoded.getBoundingClientRect()];
+    decoded.blur();
+    return Math.hypot(a.x - b.x, a.y - b.y);
+  })(),
   heading: document.querySelector('h1').textContent,
   background: getComputedStyle(document.body).backgroundColor
 }))()"""
@@ -100,7 +110,7 @@ def complaints(events):
     for event in events:
         method, parameters = event.get("method"), event.get("params", {})
         if method == "Log.entryAdded":
-            yield "console: " + parameters["entry"]["text"]
+            yield "console: " + parameters["entry"]["text"][:200]
         elif method == "Runtime.exceptionThrown":
             yield "exception: " + parameters["exceptionDetails"]["text"]
         elif method == "Network.requestWillBeSent":
@@ -115,6 +125,7 @@ def check_page(browser, path):
     session = browser.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
     for domain in ("Page", "Log", "Runtime", "Network"):
         browser.call(domain + ".enable", session)
+    browser.call("Emulation.setFocusEmulationEnabled", session, enabled=True)
     wrong, backgrounds = [], set()
     for width in WIDTHS:
         for scheme in SCHEMES:
@@ -132,6 +143,8 @@ def check_page(browser, path):
                 wrong.append(f"{view}: {seen['overflow']} pixels wider than the screen")
             if seen["broken"]:
                 wrong.append(f"{view}: pictures do not load: {seen['broken']}")
+            if seen["flip"] > 1:
+                wrong.append(f"{view}: the source lies {seen['flip']:.0f} pixels beside the decoded picture in focus")
             if not seen["heading"].strip():
                 wrong.append(f"{view}: no heading")
             backgrounds.add((scheme, seen["background"]))
