@@ -49,7 +49,7 @@ class StagingArea {
   // kConflict (name taken), kIo, kResourceExhausted.
   Status AddPayload(const std::string& name, const std::string& role,
                     std::span<const uint8_t> bytes);
-  // The same for a file that the manifest does not list (run.json).
+  // The same for a file that the manifest does not list (run.json, report.html).
   Status AddUnlisted(const std::string& name, std::span<const uint8_t> bytes);
   // What AddPayload recorded, in order of the calls.
   const std::vector<ManifestPayload>& payloads() const;

@@ -59,8 +59,8 @@ struct ManifestSource {
   std::vector<ManifestSourceFile> files;
 };
 
-// A file of the container. manifest.json itself and files that differ from run to run (run.json)
-// are not listed.
+// A file of the container. manifest.json itself and files that differ from run to run (run.json,
+// report.html) are not listed.
 struct ManifestPayload {
   std::string name;  // a plain file name in the container's directory
   std::string role;  // "features", "grid", "codebook", "weights", "sampler", "preview", "report"

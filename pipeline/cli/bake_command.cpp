@@ -64,6 +64,7 @@ void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.recipe, ParseRecipe, &job->recipe);
   Override(overrides.seed, &job->seed);
   Override(overrides.threads, &job->threads);
+  if (overrides.no_report) job->report = false;
   if (job->kind == JobKind::kBrdf) {
     const std::string names = MapOptions(overrides);
     if (!names.empty()) {

@@ -165,6 +165,8 @@ void AddBake(CLI::App* app, CommandLine* line) {
   AddOverride(command, "--seed", &o.job.seed, "Seed of every random choice (default 1)")
       ->check(CLI::Range(uint64_t{0}, kMaxSeed))
       ->type_name("N");
+  command->add_flag("--no-report", o.job.no_report,
+                    "Write no report.html, the page about quality, bytes and time");
   AddOverride(command, "--threads", &o.job.threads,
               "Threads (default: all CPUs); does not change the result")
       ->check(CLI::Range(0, kMaxThreads))

@@ -32,6 +32,7 @@ struct JobOverrides {
   std::optional<std::string> working_space;
   std::optional<std::string> color_space;
   std::optional<std::string> ocio;
+  bool no_report = false;
   bool repair_nonfinite = false;
   bool no_toksvig = false;
   bool learn_all = false;

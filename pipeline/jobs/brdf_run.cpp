@@ -8,6 +8,8 @@
 #include "pipeline/jobs/brdf_job.h"
 #include "pipeline/jobs/measure_brdf.h"
 #include "pipeline/jobs/package.h"
+#include "pipeline/jobs/page_pictures.h"
+#include "pipeline/jobs/report_page.h"
 #include "pipeline/jobs/staged_run.h"
 
 namespace patina {
@@ -132,7 +134,15 @@ class BrdfRun : public StagedRun {
         BrdfReportToJson(manifest_, staging_->payloads(), source_, measurement_, model_);
     PATINA_TRY(AddPreview(Sheet()));
     PATINA_TRY(staging_->AddPayload("report.json", "report", AsBytes(report)));
-    return staging_->WriteManifest(manifest_);
+    PATINA_TRY(staging_->WriteManifest(manifest_));
+    return AddReportPage(Curve(), [this](const PageFacts& facts) -> Result<std::string> {
+      PageTrio sphere;
+      sphere.map = "sphere";
+      PATINA_TRY(EncodeTrio({measurement_.source_picture, measurement_.decoded_picture,
+                             measurement_.difference_picture},
+                            false, staging_->directory() + "/page.tmp", &sphere));
+      return BrdfReportPage(facts, source_, measurement_, model_, sphere);
+    });
   }
 
   RgbImage Sheet() const {

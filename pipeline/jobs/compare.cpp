@@ -68,7 +68,7 @@ Result<Comparison> CompareContainer(const std::string& container, const Job& sou
   comparison.asset = opened.manifest.asset;
   comparison.directory = opened.directory;
   PATINA_ASSIGN(comparison.measurement, MeasureContainer(opened.directory, read.reference.material,
-                                                         pool, cancel, progress, nullptr));
+                                                         pool, cancel, progress, {}));
   const std::vector<ManifestSourceFile>& files = opened.manifest.source.files;
   comparison.same_source =
       files.size() == read.sha256.size() &&

@@ -375,6 +375,7 @@ std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
   if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
   if (job.seed != defaults.seed) json["seed"] = job.seed;
   if (job.threads != defaults.threads) json["threads"] = job.threads;
+  if (!job.report) json["report"] = false;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -476,6 +477,7 @@ Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
   reader.Integer("seed", 0, kMaxSeed, &job.seed);
   uint64_t threads = 0;
   reader.Integer("threads", 0, kMaxThreads, &threads);
+  reader.Flag("report", &job.report);
   if (job.kind == JobKind::kBrdf) {
     ReadBrdfFields(&reader, &problems, &job);
   } else {
@@ -541,6 +543,7 @@ std::string JobToJson(const Job& job) {
   if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
   if (job.seed != defaults.seed) json["seed"] = job.seed;
   if (job.threads != defaults.threads) json["threads"] = job.threads;
+  if (!job.report) json["report"] = false;
   if (job.target_psnr_db > 0) json["target_psnr_db"] = job.target_psnr_db;
   if (job.target_bpp > 0) json["target_bpp"] = job.target_bpp;
   if (job.size_budget_bytes > 0) json["size_budget_bytes"] = job.size_budget_bytes;

@@ -73,6 +73,7 @@ struct Job {
   Recipe recipe = Recipe::kPatina;
   uint64_t seed = 1;
   int threads = 0;  // 0: one for each CPU this process may use
+  bool report = true;  // write report.html beside the manifest; no part of the fingerprint
   // [material], all that follow.
   double target_psnr_db = 0;  // of mip 0, on the written files; 0: none
   double target_bpp = 0;      // most bits a texel of mip 0 for an engine to load; 0: no limit

@@ -18,8 +18,8 @@ namespace patina {
 //   kExitInterrupted  `cancel` was set.
 //   kExitFailed       anything else: disk, memory, a bug.
 // Unless it is done, nothing is published, an earlier container is as it was, and what was staged
-// is removed. The bytes of the container depend on the input and the job alone (run.json excepted),
-// not on the number of threads.
+// is removed. The bytes of the container depend on the input and the job alone, not on the number
+// of threads; of run.json and report.html they do not.
 JobResult RunJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
                  const RunGuards& guards = {});
 

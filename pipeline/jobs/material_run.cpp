@@ -11,9 +11,11 @@
 #include "pipeline/jobs/job_sets.h"
 #include "pipeline/jobs/measure.h"
 #include "pipeline/jobs/package.h"
+#include "pipeline/jobs/page_pictures.h"
 #include "pipeline/jobs/preview.h"
 #include "pipeline/jobs/profile_choice.h"
 #include "pipeline/jobs/report.h"
+#include "pipeline/jobs/report_page.h"
 #include "pipeline/jobs/scene_maps.h"
 #include "pipeline/jobs/staged_run.h"
 
@@ -234,8 +236,13 @@ class MaterialRun : public StagedRun {
 
   Status Verify() {
     PATINA_TRY(VerifyPayloads({staging_->directory(), WithPayloads()}));
+    const LevelViewer viewer = [this](int mip, std::span<const metrics::QualityMap> maps, int width,
+                                      int height, std::span<const metrics::PlanePair> planes) {
+      if (mip == 0) preview_.Capture(maps, width, height, planes, *pool_);
+      if (job_.report) page_pictures_.Capture(mip, maps, width, height, planes, *pool_);
+    };
     PATINA_ASSIGN(measurement_, MeasureContainer(staging_->directory(), source_.reference.material,
-                                                 *pool_, cancel_, sink_, &preview_));
+                                                 *pool_, cancel_, sink_, viewer));
     result_.psnr = SummarizePsnr(measurement_.quality);
     result_.ssim = measurement_.quality.ssim;
     result_.flip = measurement_.quality.flip;
@@ -262,7 +269,13 @@ class MaterialRun : public StagedRun {
                                                Decimals(1, result_.psnr->overall_db) + " dB",
                                            labels)));
     PATINA_TRY(staging_->AddPayload("report.json", "report", AsBytes(report)));
-    return staging_->WriteManifest(manifest_);
+    PATINA_TRY(staging_->WriteManifest(manifest_));
+    return AddReportPage(Curve(), [this](const PageFacts& facts) -> Result<std::string> {
+      PATINA_ASSIGN(const std::vector<PageTrio> pictures,
+                    page_pictures_.Encode(staging_->directory() + "/page.tmp.", *pool_));
+      return MaterialReportPage(facts, source_, measurement_, model_ ? &*model_ : nullptr,
+                                pictures);
+    });
   }
 
   // Keeps what missed the gate for a look, in place of what missed it before.
@@ -305,6 +318,7 @@ class MaterialRun : public StagedRun {
   std::optional<TrainedMaterial> model_;
   Measurement measurement_;
   Preview preview_;
+  PagePictures page_pictures_;
 };
 
 }  // namespace

@@ -209,7 +209,7 @@ class LevelPlanes {
 Result<Measurement> MeasureContainer(const std::string& directory,
                                      const MaterialReference& reference, ThreadPool& pool,
                                      const CancelToken& cancel, ProgressSink& progress,
-                                     Preview* preview) {
+                                     const LevelViewer& viewer) {
   const auto start = std::chrono::steady_clock::now();
   Decoder decoder;
   std::string problem;
@@ -242,8 +242,8 @@ Result<Measurement> MeasureContainer(const std::string& directory,
     pairs.clear();
     for (const ChannelPair& channel : layout.channels) pairs.push_back(planes.Pair(channel));
     meter.AddLevel(levels[i].width, levels[i].height, pairs, pool);
-    if (i == 0 && preview != nullptr)
-      preview->Capture(layout.maps, levels[0].width, levels[0].height, pairs, pool);
+    if (viewer)
+      viewer(static_cast<int>(i), layout.maps, levels[i].width, levels[i].height, pairs);
     done += static_cast<double>(levels[i].width) * levels[i].height;
     ProgressEvent event;
     event.stage = "verify";

@@ -2,6 +2,8 @@
 // `compare`.
 #pragma once
 
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -9,7 +11,6 @@
 #include "pipeline/base/progress.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/jobs/job_result.h"
-#include "pipeline/jobs/preview.h"
 #include "pipeline/material/target_pyramid.h"
 #include "pipeline/metrics/quality.h"
 
@@ -24,6 +25,12 @@ struct Measurement {
   std::vector<std::string> not_compared;  // maps of only one of the two
 };
 
+// Sees each mip, as it is in memory; mips count from the finest one that is compared. planes: the
+// channels of all maps in order.
+using LevelViewer =
+    std::function<void(int mip, std::span<const metrics::QualityMap> maps, int width, int height,
+                       std::span<const metrics::PlanePair> planes)>;
+
 // Decodes all mips of the container in `directory` with the reference decoder (formats/decoder),
 // from its files alone, and compares them with the reference on texel centres.
 //
@@ -36,14 +43,14 @@ struct Measurement {
 // the mips. SSIM, FLIP (of the base colour, or the first colour map) and the angle between normals:
 // mip 0 only, for time; colours of another working space are taken for Rec.709 there.
 //
-// preview: null, or receives pictures of mip 0.
+// viewer: empty, or called for each mip, from the finest on.
 // Errors: kNotFound, kCorruptData, kUnsupported, kResourceExhausted from the decoder; kConflict
 // when sizes, encodings or scales of logarithms differ or no map is in both; kInternal for a
 // decoded value that is not finite; kCancelled.
 Result<Measurement> MeasureContainer(const std::string& directory,
                                      const MaterialReference& reference, ThreadPool& pool,
                                      const CancelToken& cancel, ProgressSink& progress,
-                                     Preview* preview);
+                                     const LevelViewer& viewer);
 
 PsnrSummary SummarizePsnr(const metrics::QualityResult& quality);
 

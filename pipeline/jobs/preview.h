@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/base/thread_pool.h"
+#include "pipeline/jobs/map_picture.h"
 #include "pipeline/jobs/sheet.h"
 #include "pipeline/metrics/quality.h"
 
@@ -28,7 +29,8 @@ class Preview {
 
  private:
   struct Row {
-    RgbImage source, decoded, difference, source_detail, decoded_detail;
+    PictureTriple whole;
+    PicturePair detail;
   };
   std::vector<Row> rows_;
 };

@@ -6,6 +6,8 @@
 #include "formats/base/file_io.h"
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/machine.h"
+#include "pipeline/jobs/report_page.h"
+#include "pipeline/report/picture.h"
 
 namespace patina {
 namespace {
@@ -119,17 +121,25 @@ Status StagedRun::PassFence() {
 }
 
 Status StagedRun::AddPreview(const RgbImage& sheet) {
-  // Images are written to files only; the payload is its bytes.
-  const std::string path = staging_->directory() + "/preview.tmp.png";
-  PATINA_TRY(WriteImage(path, WriteFormat::kPng8, sheet.width, sheet.height, 3, sheet.rgb.data()));
-  auto bytes = ReadFile(path, uint64_t{1} << 30);
-  std::error_code ignored;
-  std::filesystem::remove(path, ignored);
-  if (!bytes) return Fail(bytes.error());
-  return staging_->AddPayload("preview.png", "preview", *bytes);
+  PATINA_ASSIGN(const std::vector<uint8_t> png,
+                EncodePng(staging_->directory() + "/preview.tmp.png", sheet.width, sheet.height, 3,
+                          sheet.rgb.data()));
+  return staging_->AddPayload("preview.png", "preview", png);
 }
 
-Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {
+Status StagedRun::AddReportPage(std::vector<RunCurvePoint> curve,
+                                const std::function<Result<std::string>(const PageFacts&)>& text) {
+  if (!job_.report) return {};
+  const Manifest manifest = WithPayloads();
+  const RunRecord run = RecordSoFar(std::move(curve));
+  PATINA_ASSIGN(std::vector<uint64_t> zstd_bytes,
+                ZstdSizes(staging_->directory(), manifest.payloads));
+  PATINA_ASSIGN(const std::string page, text({job_, manifest, run, result_.stopped_by,
+                                              result_.warnings, std::move(zstd_bytes)}));
+  return staging_->AddUnlisted(kReportPageName, AsBytes(page));
+}
+
+RunRecord StagedRun::RecordSoFar(std::vector<RunCurvePoint> curve) const {
   RunRecord record;
   record.asset = job_.asset;
   record.fingerprint = result_.fingerprint;
@@ -149,7 +159,11 @@ Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {
   record.stages = stages_;
   record.recording_seconds = recording_seconds_;
   record.curve = std::move(curve);
-  const std::string text = RunRecordToJson(record);
+  return record;
+}
+
+Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {
+  const std::string text = RunRecordToJson(RecordSoFar(std::move(curve)));
   return staging_->AddUnlisted("run.json", AsBytes(text));
 }
 

@@ -21,6 +21,8 @@
 
 namespace patina {
 
+struct PageFacts;  // report_page.h
+
 // Names the stage in every report, and remembers the warnings.
 class StageSink : public ProgressSink {
  public:
@@ -68,6 +70,9 @@ class StagedRun {
   Status PassFence();
   // Writes a picture as the payload preview.png.
   Status AddPreview(const RgbImage& sheet);
+  // Writes report.html, unless the job asks for none. Call once the manifest is complete.
+  Status AddReportPage(std::vector<RunCurvePoint> curve,
+                       const std::function<Result<std::string>(const PageFacts&)>& text);
   Status AddRunRecord(std::vector<RunCurvePoint> curve);
   // AddRunRecord and the container's publication.
   Status Publish(std::vector<RunCurvePoint> curve);
@@ -89,6 +94,8 @@ class StagedRun {
 
  private:
   using Clock = std::chrono::steady_clock;
+
+  RunRecord RecordSoFar(std::vector<RunCurvePoint> curve) const;
 
   Clock::time_point start_;
   double start_cpu_;

@@ -87,7 +87,7 @@ TEST(Bake, MakesAContainerAndSaysSoInJson) {
   const std::string container = json["container"];
   EXPECT_TRUE(fs::equivalent(container, folder / "out/floor/current"));
   for (const char* file : {"manifest.json", "features_0.dds", "features_3.dds", "decoder.weights",
-                           "preview.png", "report.json", "run.json"}) {
+                           "preview.png", "report.html", "report.json", "run.json"}) {
     EXPECT_TRUE(fs::is_regular_file(container + "/" + file)) << file;
   }
   EXPECT_FALSE(HasStaging(folder / "out"));

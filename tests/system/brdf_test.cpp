@@ -90,7 +90,7 @@ TEST_F(BakedBrdf, SaysHowGoodItIs) {
 TEST_F(BakedBrdf, IsAContainerOfItsKind) {
   const std::string current = Asset() + "/current";
   for (const char* file : {"manifest.json", "grid.hpx", "decoder.weights", "sampler.bin",
-                           "preview.png", "report.json", "run.json"}) {
+                           "preview.png", "report.html", "report.json", "run.json"}) {
     EXPECT_TRUE(fs::is_regular_file(current + "/" + file)) << file;
   }
   const std::string text = ReadAll(current + "/manifest.json");

@@ -101,7 +101,8 @@ std::vector<std::pair<std::string, std::string>> Snapshot(const std::string& fol
     const std::string name = fs::relative(entry.path(), folder).string();
     if (entry.is_symlink()) {
       files.emplace_back(name, "-> " + fs::read_symlink(entry.path()).string());
-    } else if (entry.is_regular_file() && entry.path().filename() != "run.json") {
+    } else if (entry.is_regular_file() && entry.path().filename() != "run.json" &&
+               entry.path().filename() != "report.html") {
       files.emplace_back(name, ReadAll(entry.path().string()));
     }
   }

@@ -55,7 +55,8 @@ class TempFolder {
 
 std::string ReadAll(const std::string& path);
 
-// All files below a folder, with their content, but for run.json, in which times stand.
+// All files below a folder, with their content, but for run.json and report.html, in which times
+// stand.
 std::vector<std::pair<std::string, std::string>> Snapshot(const std::string& folder);
 
 }  // namespace patina::testing_support

@@ -67,6 +67,7 @@ TEST(ParseJob, ReadsEveryFieldOfTheFullExample) {
   EXPECT_EQ(job->normal_convention, "opengl");
   EXPECT_TRUE(job->repair_nonfinite);
   EXPECT_FALSE(job->toksvig);
+  EXPECT_FALSE(job->report);
   ASSERT_EQ(job->maps.size(), 7u);
   EXPECT_EQ(job->maps[5].color_space, "Utility - Linear - P3-D65");
   EXPECT_EQ(job->working_space, WorkingSpace::kAcesCg);
@@ -353,6 +354,7 @@ TEST(JobSchema, AgreesWithTheParser) {
                           "quality",
                           "recipe",
                           "seed",
+                          "report",
                           "threads",
                           "target_psnr_db",
                           "target_bpp",
@@ -375,7 +377,7 @@ TEST(JobSchema, AgreesWithTheParser) {
     documents.push_back(json);
   }
   for (const char* key : {"kind", "file", "model", "folder", "maps", "samples", "quality", "seed",
-                          "toksvig", "unknown"}) {
+                          "report", "toksvig", "unknown"}) {
     for (const Json& value : values) {
       Json json = MinimalBrdf();
       json[key] = value;
@@ -416,6 +418,7 @@ TEST(CanonicalJob, LeavesOutWhatDoesNotChangeTheBytes) {
   b.out = "other";
   b.threads = 7;
   b.min_psnr_db = 30;
+  b.report = false;
   EXPECT_EQ(CanonicalJob(a), CanonicalJob(b));
   for (auto change :
        {+[](Job* j) { j->seed = 2; }, +[](Job* j) { j->profile = Profile::kBcf2k; },
