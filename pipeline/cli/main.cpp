@@ -51,6 +51,8 @@ int Dispatch(const CommandLine& line) {
       return SampleCommand(line);
     case Command::kShader:
       return ShaderCommand(line);
+    case Command::kTradeoff:
+      return TradeoffCommand(line, g_cancel);
     case Command::kSubmit:
       return SubmitCommand(line.client, g_cancel);
     case Command::kJobs:

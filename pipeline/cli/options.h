@@ -49,6 +49,14 @@ struct BakeOptions {
   JobOverrides job;
 };
 
+// Lists that are empty: not asked for.
+struct TradeoffOptions {
+  std::vector<std::string> inputs;
+  std::string out;
+  std::vector<std::string> profiles, qualities, recipes, interpolations;
+  std::vector<int> nsides, index_bits, hidden, hidden_layers, shares;
+};
+
 struct RunOptions {
   std::string job_file;
   RunGuards guards;
@@ -106,6 +114,7 @@ enum class Command {
   kEval,
   kSample,
   kShader,
+  kTradeoff,
   // Of a daemon's client.
   kSubmit,
   kJobs,
@@ -126,6 +135,7 @@ struct CommandLine {
   EvalOptions eval;
   SampleOptions sample;
   ShaderCommandOptions shader;
+  TradeoffOptions tradeoff;
   ClientOptions client;
   bool json = false;
   Verbosity verbosity = Verbosity::kNormal;

@@ -54,6 +54,7 @@ struct Frame {
 
 Frame FrameOf(const LinePlot& plot) {
   Frame frame;
+  frame.x.logarithmic = plot.log_x;
   frame.y.logarithmic = plot.log_y;
   constexpr double kFar = std::numeric_limits<double>::infinity();
   frame.x.low = frame.y.low = kFar;
@@ -73,8 +74,9 @@ Frame FrameOf(const LinePlot& plot) {
   }
   if (frame.points == 0) return frame;
   for (const PlotRule& rule : plot.rules) include(rule.at, rule.vertical ? &frame.x : &frame.y);
-  if (plot.from_zero_x && frame.x.low > 0) frame.x.low = 0;
-  if (plot.from_zero_x && frame.x.low == 0 && frame.x.high > 0) {
+  const bool from_zero = plot.from_zero_x && !plot.log_x;
+  if (from_zero && frame.x.low > 0) frame.x.low = 0;
+  if (from_zero && frame.x.low == 0 && frame.x.high > 0) {
     frame.x.high *= 1.04;
   } else {
     Widen(&frame.x, 0.04);
@@ -213,7 +215,8 @@ void AddLine(const PlotLine& line, size_t number, const Frame& frame, Html* html
     shapes += ShapePath(number, x, y, line.thin ? kPointRadius * 0.7 : kPointRadius);
   }
   if (path.empty()) return;
-  html->AddEmpty("path", {{"class", LineClass(line, number)}, {"d", path}});
+  if (!line.only_points)
+    html->AddEmpty("path", {{"class", LineClass(line, number)}, {"d", path}});
   html->AddEmpty("path", {{"class", PointClass(line, number)}, {"d", shapes}});
 }
 
@@ -226,7 +229,8 @@ void AddLegend(const LinePlot& plot, Html* html) {
                        {"height", "14"},
                        {"aria-hidden", "true"},
                        {"focusable", "false"}});
-    html->AddEmpty("path", {{"class", LineClass(plot.lines[i], i)}, {"d", "M1.0 7.0H35.0"}});
+    if (!plot.lines[i].only_points)
+      html->AddEmpty("path", {{"class", LineClass(plot.lines[i], i)}, {"d", "M1.0 7.0H35.0"}});
     html->AddEmpty("path", {{"class", PointClass(plot.lines[i], i)},
                             {"d", ShapePath(i, 18, 7, kPointRadius)}});
     html->Close();

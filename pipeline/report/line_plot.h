@@ -19,6 +19,7 @@ struct PlotLine {
   std::vector<PlotPoint> points;  // those that are not finite are left out
   bool thin = false;              // of less interest
   int color = -1;                 // 0 to 5 of the style sheet; negative: by its place
+  bool only_points = false;       // nothing is drawn between them
 };
 
 // A straight line across the plot: a budget, a target, an end.
@@ -34,7 +35,8 @@ struct LinePlot {
   std::string x_label, y_label;
   std::vector<PlotLine> lines;
   std::vector<PlotRule> rules;
-  bool log_y = false;  // values that are not above 0 are then left out
+  bool log_x = false;  // values that are not above 0 are then left out
+  bool log_y = false;  // likewise
   bool from_zero_x = true;
 };
 
