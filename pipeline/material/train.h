@@ -11,6 +11,7 @@
 #include "formats/base/result.h"
 #include "formats/bc6h.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/base/rate_guard.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/material/target_pyramid.h"
 
@@ -54,6 +55,7 @@ struct TrainOptions {
   double target_psnr_db = 0;    // 0: none. Stops once the held-out PSNR of mip 0 is there
   double samples = 0;           // 0: by quality and size. Otherwise train with exactly this many (rounded up to a step)
   const CancelToken* cancel = nullptr;
+  RateFault rate_fault;         // for tests
 };
 
 // Quality along the way, on texel centres that the estimate visits at a fixed stride; deterministic but for the seconds.
@@ -86,14 +88,14 @@ struct TrainedMaterial {
   double exported_psnr_mean_mips_db = 0;
   double exported_psnr_off_grid_db = 0;
   std::vector<double> float_psnr_mips_db, exported_psnr_mips_db;  // per mip of the source
-  int rollbacks = 0;  // training steps undone because a value was not finite
+  int rollbacks = 0;  // how often training went back to an earlier state because a value was not finite
 };
 
 // The samples that the options ask for at most.
 double SampleBudget(const MaterialReference& reference, const TrainOptions& options);
 
 // Errors: kInvalidArgument (no learned channel, more than kMaxOutputs), kOutOfRange (coded values whose network does not fit
-// half precision), kCancelled, kUnsupported (CPU).
+// half precision; RateGuard::kMaxRollbacks rollbacks), kCancelled, kUnsupported (CPU).
 Result<TrainedMaterial> TrainMaterial(const MaterialReference& reference, const ModelShape& shape,
                                       const TrainOptions& options, ThreadPool& pool, ProgressSink& progress);
 
