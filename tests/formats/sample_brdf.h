@@ -98,7 +98,6 @@ inline Manifest FullBrdfManifest() {
   brdf.network = "decoder.weights";
   brdf.layers = {35, 32, 32, 3};
   brdf.sampler = "sampler.bin";
-  brdf.rollbacks = 2;
   brdf.quality.image_mae = 0.00125;
   brdf.quality.image_rmse = 0.0025;
   brdf.quality.image_ssim = 0.9990234375;
