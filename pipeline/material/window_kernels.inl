@@ -419,6 +419,7 @@ template <BlockForm kForm>
 PATINA_STAGE void UpdateLevel(const WindowTask& task, const LevelTaps& taps, const float* tile, int first_x, int first_y, F16* check) {
   FeatureLevel* level = taps.level;
   constexpr int kStride = BlockStride(kForm);
+  F16 here = Zero();  // a register: stores to parameters may not alias it
   for (int j = 0; j < taps.y.span_count; ++j) {
     const AxisTaps::BlockSpan& ys = taps.y.spans[j];
     for (int i = 0; i < taps.x.span_count; ++i) {
@@ -431,13 +432,14 @@ PATINA_STAGE void UpdateLevel(const WindowTask& task, const LevelTaps& taps, con
       BlockGradient<kForm>(level->params.data() + static_cast<size_t>(block) * kStride,
                            kPartitionMasks[level->partition[block]], texels, gradient);
       if (task.update == FeatureUpdate::kAdam) {
-        UpdateBlock<kForm>(level, block, gradient, task.rates, check);
+        UpdateBlock<kForm>(level, block, gradient, task.rates, &here);
       } else {
         float* sum = level->gradient.data() + static_cast<size_t>(block) * kStride;
         Unroll<kStride / 16>([&](auto k) PATINA_LAMBDA { Store(sum + 16 * k, Load(sum + 16 * k) + gradient[k]); });
       }
     }
   }
+  *check = *check + here;
 }
 
 // --- whole windows ---
