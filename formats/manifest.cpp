@@ -230,6 +230,7 @@ ordered_json BrdfToJson(const ManifestBrdf& brdf) {
   json["network"]["activation"] = brdf.activation;
   json["output_transform"] = brdf.output_transform;
   if (!brdf.sampler.empty()) json["sampler"] = brdf.sampler;
+  if (brdf.rollbacks != 0) json["rollbacks"] = brdf.rollbacks;
   return json;
 }
 
@@ -468,6 +469,8 @@ void ReadBrdfModel(const JsonView& json, ManifestBrdf* brdf) {
   brdf->activation = network.Field("activation").String();
   brdf->output_transform = json.Field("output_transform").String();
   if (const JsonView sampler = json.Optional("sampler")) brdf->sampler = sampler.String();
+  if (const JsonView rollbacks = json.Optional("rollbacks"))
+    brdf->rollbacks = rollbacks.Int(0, std::numeric_limits<int>::max());
 }
 
 void ReadBrdfQuality(const JsonView& json, JsonProblem* problem, ManifestBrdfQuality* quality) {

@@ -252,6 +252,7 @@ struct ManifestBrdf {
   std::string activation = "relu";         // between layers
   std::string output_transform = "expm1";  // f = max(0, exp(min(y, 12)) - 1)
   std::string sampler;                     // of the payload of role "sampler"; empty if none
+  int rollbacks = 0;  // how often training went back because a value was not finite
   ManifestBrdfQuality quality;
 };
 

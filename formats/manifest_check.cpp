@@ -399,6 +399,7 @@ Status CheckBrdf(const Manifest& manifest) {
     PATINA_TRY(InRange("/brdf/network/layers/" + std::to_string(i), brdf.layers[i], 1,
                        kMaxManifestLayerWidth));
   }
+  if (brdf.rollbacks < 0) return Bad("/brdf/rollbacks", "negative");
   if (brdf.half_vector_inputs && !brdf.angle_inputs)
     return Bad("/brdf/half_vector_inputs", "true without angle_inputs");
   const int inputs =

@@ -46,7 +46,9 @@ PATINA_INLINE F16 LineOfMoments(F16 m0, const F16 m1[3], const F16 m2[6], float 
               Select(z_over, m[5], Select(y_over_x, m[4], m[2]))};
   const F16 length2 = Dot(v, v);
   const F16 unit = Set(1.0f) / Sqrt(Max(length2, tiny));
-  for (int c = 0; c < 3; ++c) direction[c] = v[c] * unit;
+  // Where all points coincide, rounding may leave products of the axes and no variance: the powers of such a matrix overflow.
+  const M16 meaningful = length2 < Set(0x1p60f);  // false for NaN
+  for (int c = 0; c < 3; ++c) direction[c] = ZeroUnless(meaningful, v[c] * unit);
   F16 image[3];
   Multiply(cov, direction, image);
   const F16 along = Dot(direction, image);

@@ -144,8 +144,9 @@ struct BrdfKernels {
   void (*softmax_gradient)(const float* logits, int columns, float temperature,
                            const float* transposed, const float* feature_gradient, int stride,
                            float* gradient);
-  // One Adam step of `count` floats, a multiple of 16; clears the gradient.
-  void (*adam)(float* parameters, float* gradient, float* moment1, float* moment2, size_t count,
+  // One Adam step of `count` floats, a multiple of 16; clears the gradient. Returns false if a
+  // parameter or moment is not finite afterwards.
+  bool (*adam)(float* parameters, float* gradient, float* moment1, float* moment2, size_t count,
                const AdamSettings& settings);
 };
 

@@ -230,13 +230,14 @@ void SoftmaxGradient(const float* logits, int columns, float temperature, const 
   }
 }
 
-void Adam(float* parameters, float* gradient, float* moment1, float* moment2, size_t count,
+bool Adam(float* parameters, float* gradient, float* moment1, float* moment2, size_t count,
           const brdf::AdamSettings& settings) {
   const F16 beta1 = Set(settings.beta1), rest1 = Set(1 - settings.beta1);
   const F16 beta2 = Set(settings.beta2), rest2 = Set(1 - settings.beta2);
   const F16 rate = Set(settings.rate * settings.correction1),
             correction2 = Set(settings.correction2), epsilon = Set(settings.epsilon),
             kept = Set(1 - settings.rate * settings.decay);
+  F16 check = Zero();
   for (size_t i = 0; i < count; i += 16) {
     const F16 g = Load(gradient + i);
     const F16 m = MulAdd(rest1, g, beta1 * Load(moment1 + i));
@@ -244,9 +245,12 @@ void Adam(float* parameters, float* gradient, float* moment1, float* moment2, si
     Store(moment1 + i, m);
     Store(moment2 + i, v);
     Store(gradient + i, Zero());
-    Store(parameters + i,
-          kept * Load(parameters + i) - rate * m / (Sqrt(v * correction2) + epsilon));
+    const F16 updated =
+        kept * Load(parameters + i) - rate * m / (Sqrt(v * correction2) + epsilon);
+    Store(parameters + i, updated);
+    check = MulAdd(updated + v, Zero(), check);
   }
+  return ReduceSum(check) == 0.0f;
 }
 
 }  // namespace

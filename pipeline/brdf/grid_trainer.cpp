@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <utility>
 
 namespace patina::brdf {
@@ -77,13 +78,16 @@ ChunkTask GridTrainer::MakeTask(const PoolSample* samples, int count) const {
   return task;
 }
 
-void GridTrainer::UpdateRows(const std::vector<int32_t>& rows, const AdamSettings& settings,
+bool GridTrainer::UpdateRows(const std::vector<int32_t>& rows, const AdamSettings& settings,
                              float* values, float* gradient, float* moment1, float* moment2) {
   const size_t stride = layout_.feature_stride;
+  bool finite = true;
   for (const int32_t row : rows) {
     const size_t at = static_cast<size_t>(row) * stride;
-    kernels_.adam(values + at, gradient + at, moment1 + at, moment2 + at, stride, settings);
+    finite &=
+        kernels_.adam(values + at, gradient + at, moment1 + at, moment2 + at, stride, settings);
   }
+  return finite;
 }
 
 bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& rates) {
@@ -95,21 +99,26 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
     kernels_.train_chunk(MakeTask(samples + first, std::min(kChunkRows, count - first)),
                          scratch_[worker].get(), results_[chunk].get());
   });
+  double loss = 0;
   for (int chunk = 0; chunk < chunks; ++chunk) {
     if (!std::isfinite(results_[chunk]->loss) || !results_[chunk]->finite) return false;
+    loss += results_[chunk]->loss;
   }
+  step_loss_ = loss / count;
   ++steps_;
   if (has_codebook()) ++code_steps_;
 
+  bool finite[3] = {true, true, true};
   pool_.ParallelFor(3, [&](int job, int) {
     if (job == 2) {
       for (int chunk = 0; chunk < chunks; ++chunk) {
         const float* from = results_[chunk]->weight_gradient.data();
         for (size_t i = 0; i < layout_.parameter_count; ++i) parameter_gradient_[i] += from[i];
       }
-      kernels_.adam(parameters_.data(), parameter_gradient_.data(), parameter_moment1_.data(),
-                    parameter_moment2_.data(), layout_.parameter_count,
-                    Settings(rates.network, rates.decay, steps_));
+      finite[job] = kernels_.adam(parameters_.data(), parameter_gradient_.data(),
+                                  parameter_moment1_.data(), parameter_moment2_.data(),
+                                  layout_.parameter_count,
+                                  Settings(rates.network, rates.decay, steps_));
       TransposeWeights(layout_, parameters_.data(), transposed_.data());
       return;
     }
@@ -131,10 +140,12 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
     }
     for (const int32_t row : rows) touched_[row] = 0;
     if (!has_codebook())
-      UpdateRows(rows, Settings(rates.features, rates.decay, steps_), features_.data(),
-                 gradient_.data(), moment1_.data(), moment2_.data());
+      finite[job] = UpdateRows(rows, Settings(rates.features, rates.decay, steps_),
+                               features_.data(), gradient_.data(), moment1_.data(),
+                               moment2_.data());
   });
-  if (!has_codebook()) return true;
+  bool all_finite = finite[0] && finite[1] && finite[2];
+  if (!has_codebook()) return all_finite;
 
   // Corners of both directions share the codes.
   code_rows_.clear();
@@ -156,13 +167,45 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
     }
   }
   for (const int32_t code : code_rows_) code_touched_[code] = 0;
-  UpdateRows(code_rows_, Settings(rates.features, rates.decay, code_steps_), codebook_.data(),
-             code_gradient_.data(), code_moment1_.data(), code_moment2_.data());
+  all_finite &=
+      UpdateRows(code_rows_, Settings(rates.features, rates.decay, code_steps_), codebook_.data(),
+                 code_gradient_.data(), code_moment1_.data(), code_moment2_.data());
   if (soft_ && code_steps_ % kStepsPerUpdate == 0) {
-    soft_->Update(codebook_.data(), rates.temperature, Settings(rates.logits, 0, ++logit_steps_),
-                  index_);
+    all_finite &= soft_->Update(codebook_.data(), rates.temperature,
+                                Settings(rates.logits, 0, ++logit_steps_), index_);
   }
-  return true;
+  return all_finite;
+}
+
+size_t GridTrainer::state_bytes() const {
+  const size_t floats = parameters_.size() + (has_codebook() ? codebook_ : features_).size();
+  return floats * sizeof(float) + (soft_ ? soft_->state_bytes() : 0);
+}
+
+void GridTrainer::Save() {
+  const auto copy = [](const AlignedBuffer<float>& from, AlignedBuffer<float>* to) {
+    if (to->size() != from.size()) to->Reset(from.size());
+    std::memcpy(to->data(), from.data(), from.size() * sizeof(float));
+  };
+  copy(parameters_, &saved_parameters_);
+  copy(has_codebook() ? codebook_ : features_, &saved_features_);
+  if (soft_) soft_->Save();
+}
+
+void GridTrainer::Rollback() {
+  AlignedBuffer<float>& features = has_codebook() ? codebook_ : features_;
+  std::memcpy(parameters_.data(), saved_parameters_.data(), parameters_.size() * sizeof(float));
+  std::memcpy(features.data(), saved_features_.data(), features.size() * sizeof(float));
+  for (auto* buffer : {&parameter_gradient_, &parameter_moment1_, &parameter_moment2_, &gradient_,
+                       &moment1_, &moment2_, &code_gradient_, &code_moment1_, &code_moment2_}) {
+    std::fill(buffer->data(), buffer->data() + buffer->size(), 0.0f);
+  }
+  steps_ = code_steps_ = logit_steps_ = 0;
+  if (soft_) {
+    soft_->Rollback();
+    soft_->WriteIndices(index_);
+  }
+  ParametersChanged();
 }
 
 void GridTrainer::UseSoftIndex(std::unique_ptr<SoftIndex> soft) {

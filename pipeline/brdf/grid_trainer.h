@@ -33,9 +33,17 @@ class GridTrainer {
   GridTrainer(const NetworkLayout& layout, int corners, const BrdfKernels& kernels,
               ThreadPool& pool, uint64_t seed);
 
-  // One step on `count` samples. Returns false, changing nothing that is trained, if the loss or a
-  // gradient was not finite.
+  // One step on `count` samples. Returns false if the loss, a gradient, a moment or a parameter is
+  // not finite: the state is then of no use and has to be rolled back.
   bool Step(const PoolSample* samples, int count, const StepRates& rates);
+
+  // Save keeps what is trained for Rollback, which also forgets the optimiser's state. Whatever
+  // else changes what is trained should save anew; UseCodebook and UseSoftIndex must be followed by
+  // it.
+  void Save();
+  void Rollback();
+  size_t state_bytes() const;  // of what Save copies
+  double step_loss() const { return step_loss_; }  // mean of the last step's samples
 
   // Goes over to a codebook: `codes` rows and an index for each corner. From here on steps move the
   // codes; the index stays.
@@ -58,7 +66,7 @@ class GridTrainer {
 
  private:
   ChunkTask MakeTask(const PoolSample* samples, int count) const;
-  void UpdateRows(const std::vector<int32_t>& rows, const AdamSettings& settings, float* values,
+  bool UpdateRows(const std::vector<int32_t>& rows, const AdamSettings& settings, float* values,
                   float* gradient, float* moment1, float* moment2);
 
   const NetworkLayout& layout_;
@@ -69,6 +77,7 @@ class GridTrainer {
       parameter_moment2_;
   AlignedBuffer<float> features_, gradient_, moment1_, moment2_;
   AlignedBuffer<float> codebook_, code_gradient_, code_moment1_, code_moment2_;
+  AlignedBuffer<float> saved_parameters_, saved_features_;  // features or codebook
   std::vector<int32_t> index_;
   std::unique_ptr<SoftIndex> soft_;
   std::vector<std::unique_ptr<ChunkScratch>> scratch_;
@@ -76,6 +85,7 @@ class GridTrainer {
   std::vector<uint8_t> touched_, code_touched_;
   std::vector<int32_t> rows_[2], code_rows_;
   int steps_ = 0, code_steps_ = 0, logit_steps_ = 0;
+  double step_loss_ = 0;
 };
 
 }  // namespace patina::brdf

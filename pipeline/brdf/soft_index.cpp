@@ -1,6 +1,8 @@
 #include "pipeline/brdf/soft_index.h"
 
 #include <algorithm>
+#include <atomic>
+#include <cstring>
 #include <utility>
 
 #include "pipeline/base/rng.h"
@@ -100,7 +102,7 @@ void SoftIndex::Accumulate(int32_t corner, const float* gradient) {
   for (int k = 0; k < stride_; ++k) to[k] += gradient[k];
 }
 
-void SoftIndex::Update(const float* codebook, float temperature, const AdamSettings& settings,
+bool SoftIndex::Update(const float* codebook, float temperature, const AdamSettings& settings,
                        std::span<int32_t> index) {
   for (int j = 0; j < codes_; ++j) {
     for (int k = 0; k < stride_; ++k)
@@ -108,6 +110,7 @@ void SoftIndex::Update(const float* codebook, float temperature, const AdamSetti
           codebook[static_cast<size_t>(j) * stride_ + k];
   }
   const int tasks = static_cast<int>((touched_rows_.size() + kRowsPerTask - 1) / kRowsPerTask);
+  std::atomic<bool> finite{true};
   pool_.ParallelFor(tasks, [&](int task, int worker) {
     float* slope = scratch_.data() + static_cast<size_t>(worker) * columns_;
     const size_t begin = static_cast<size_t>(task) * kRowsPerTask;
@@ -117,12 +120,28 @@ void SoftIndex::Update(const float* codebook, float temperature, const AdamSetti
       kernels_.softmax_gradient(LogitsOfRow(row), columns_, temperature, transposed_.data(),
                                 gradient, stride_, slope);
       std::fill(gradient, gradient + stride_, 0.0f);
-      kernels_.adam(LogitsOfRow(row), slope, moment1_.data() + row * columns_,
-                    moment2_.data() + row * columns_, columns_, settings);
+      if (!kernels_.adam(LogitsOfRow(row), slope, moment1_.data() + row * columns_,
+                         moment2_.data() + row * columns_, columns_, settings)) {
+        finite.store(false, std::memory_order_relaxed);
+      }
       touched_[row] = 0;
       index[corners_[row]] = Largest(row);
     }
   });
+  touched_rows_.clear();
+  return finite.load();
+}
+
+void SoftIndex::Save() {
+  if (saved_logits_.size() == 0) saved_logits_.Reset(logits_.size());
+  std::memcpy(saved_logits_.data(), logits_.data(), logits_.size() * sizeof(float));
+}
+
+void SoftIndex::Rollback() {
+  std::memcpy(logits_.data(), saved_logits_.data(), logits_.size() * sizeof(float));
+  for (auto* buffer : {&moment1_, &moment2_, &gradient_})
+    std::fill(buffer->data(), buffer->data() + buffer->size(), 0.0f);
+  std::fill(touched_.begin(), touched_.end(), uint8_t{0});
   touched_rows_.clear();
 }
 

@@ -34,10 +34,16 @@ class SoftIndex {
   void Accumulate(int32_t corner, const float* gradient);
 
   // One Adam step of all rows that got a gradient since the last one, then their indices anew.
-  void Update(const float* codebook, float temperature, const AdamSettings& settings,
+  // Returns false if a logit or moment is not finite afterwards.
+  bool Update(const float* codebook, float temperature, const AdamSettings& settings,
               std::span<int32_t> index);
   // The indices of all corners that have logits.
   void WriteIndices(std::span<int32_t> index) const;
+
+  // Save keeps the logits; Rollback brings them back and forgets gradients and moments.
+  void Save();
+  void Rollback();
+  size_t state_bytes() const { return logits_.size() * sizeof(float); }
 
  private:
   float* LogitsOfRow(size_t row) { return logits_.data() + row * columns_; }
@@ -49,6 +55,7 @@ class SoftIndex {
   const BrdfKernels& kernels_;
   ThreadPool& pool_;
   AlignedBuffer<float> logits_, moment1_, moment2_;  // [row][columns_]
+  AlignedBuffer<float> saved_logits_;
   AlignedBuffer<float> gradient_;                    // [row][stride_]
   AlignedBuffer<float> transposed_;                  // codebook [stride_][columns_]
   AlignedBuffer<float> scratch_;                     // [thread][columns_]

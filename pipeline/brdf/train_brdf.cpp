@@ -62,7 +62,8 @@ class Session {
         kernels_(kernels),
         materials_(static_cast<int>(sources.size())),
         layout_(shape.primitive_size, shape.grid.extra_inputs(), shape.hidden, shape.hidden_layers),
-        trainer_(layout_, 2 * materials_ * shape.grid.corners(), kernels, pool, options.seed) {
+        trainer_(layout_, 2 * materials_ * shape.grid.corners(), kernels, pool, options.seed),
+        guard_(options.rate_fault) {
     DrawSamples(sources);
   }
 
@@ -74,13 +75,14 @@ class Session {
     CountUsage();
     const double growth = 0.5 * (materials_ + 1);
     const int total = static_cast<int>(growth * (options_.free_steps + options_.codebook_steps));
+    trainer_.Save();
     const bool has_free_part = options_.index_training != IndexTraining::kSoftmax;
     const int free_steps = has_free_part ? static_cast<int>(growth * options_.free_steps) : 0;
     const int code_steps = total - free_steps;
     for (int step = 0; step < free_steps; ++step) {
       if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
       const float factor = CosineRate(step, free_steps);
-      Step({options_.feature_rate * factor, options_.network_rate * factor, options_.decay});
+      PATINA_TRY(Step({options_.feature_rate * factor, options_.network_rate * factor, options_.decay}));
       PullToCodes(step, free_steps);
       Report(step, total);
     }
@@ -91,6 +93,7 @@ class Session {
     } else {
       StartCodesAtRandom();
     }
+    trainer_.Save();
     for (int step = 0; step < code_steps; ++step) {
       if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
       const float factor = CosineRate(step, code_steps);
@@ -101,11 +104,12 @@ class Session {
       rates.decay = options_.decay;
       rates.logits = options_.logit_rate * factor;
       rates.temperature = 1 - 0.5f * static_cast<float>(step) / static_cast<float>(code_steps);
-      Step(rates);
+      PATINA_TRY(Step(rates));
       Report(free_steps + step, total);
     }
     result_.used_codes = UsagePerplexity(trainer_.index(), usage_, Codes());
     result_.final_loss = HeldOut();
+    result_.rollbacks = guard_.rollbacks();
     Record();
     return Finish();
   }
@@ -154,13 +158,20 @@ class Session {
     for (float& u : usage_) u = std::sqrt(u);
   }
 
-  void Step(const StepRates& rates) {
+  Status Step(StepRates rates) {
+    const float guarded = static_cast<float>(guard_.NextFactor());
+    for (float* rate : {&rates.features, &rates.network, &rates.logits}) *rate *= guarded;
     const size_t batch = std::min<size_t>(options_.batch, train_count_);
     if (next_ + batch > train_count_) next_ = 0;
-    if (!trainer_.Step(samples_.data() + next_, static_cast<int>(batch), rates))
-      ++result_.rollbacks;
+    const bool good = trainer_.Step(samples_.data() + next_, static_cast<int>(batch), rates);
     next_ += batch;
     result_.samples += static_cast<double>(batch);
+    if (good) {
+      if (guard_.SaveIsDue(trainer_.step_loss(), trainer_.state_bytes())) trainer_.Save();
+      return {};
+    }
+    trainer_.Rollback();
+    return guard_.RolledBack(result_.samples);
   }
 
   FeatureRows Features() {
@@ -359,6 +370,7 @@ class Session {
   int materials_;
   NetworkLayout layout_;
   GridTrainer trainer_;
+  RateGuard guard_;
   AlignedBuffer<PoolSample> samples_;
   size_t held_out_ = 0, train_count_ = 0, next_ = 0;
   std::vector<float> usage_;

@@ -16,6 +16,7 @@
 #include "formats/index_pack.h"
 #include "formats/weights.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/base/rate_guard.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/brdf/sample_pool.h"
 
@@ -78,6 +79,7 @@ struct TrainOptions {
   // 0.1 adds a quarter to the error of glossy tables.
   float decay = 0.02f;
   const CancelToken* cancel = nullptr;
+  RateFault rate_fault;  // for tests
 };
 
 // The default training. Lists get a strong decay, which makes them smooth between measurements.
@@ -104,11 +106,12 @@ struct TrainedBrdf {
   double used_codes = 0;  // perplexity
   double free_loss = 0;   // held-out, of the continuous features before they became codes
   double final_loss = 0;
-  int rollbacks = 0;  // steps left out because a value was not finite
+  int rollbacks = 0;  // how often training went back because a value was not finite
 };
 
 // Errors: kInvalidArgument (a shape out of range), kCorruptData (no valid data), kCancelled,
-// kOutOfRange (weights beyond halves), kUnsupported (CPU).
+// kOutOfRange (weights or codes beyond halves; RateGuard::kMaxRollbacks rollbacks), kUnsupported
+// (CPU).
 Result<TrainedBrdf> TrainBrdf(const Source& source, const ModelShape& shape,
                               const TrainOptions& options, ThreadPool& pool,
                               ProgressSink& progress);

@@ -57,8 +57,7 @@ int Worse(int a, int b) {
 class Session {
  public:
   Session(const ClientOptions& options, const CancelToken& cancel)
-      : options_(options),
-        cancel_(cancel),
+      : cancel_(cancel),
         client_(options.socket.empty() ? DefaultSocketPath() : options.socket, cancel) {}
 
   // The body of an answer; an answer of 400 and above is an error.
@@ -130,7 +129,6 @@ class Session {
     return error.code == ErrorCode::kNotFound || error.code == ErrorCode::kCorruptData;
   }
 
-  const ClientOptions& options_;
   const CancelToken& cancel_;
   HttpClient client_;
 };

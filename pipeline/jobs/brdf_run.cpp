@@ -86,8 +86,9 @@ class BrdfRun : public StagedRun {
     result_.samples = model_.samples;
     result_.stopped_by = "budget";
     if (model_.rollbacks > 0) {
-      sink_.OnWarning("the training ran into values that are not finite and left out " +
-                      std::to_string(model_.rollbacks) + " steps; look at the preview");
+      sink_.OnWarning("the training ran into values that are not finite and was set back " +
+                      std::to_string(model_.rollbacks) +
+                      " times, with lower rates; look at the preview");
     }
     return {};
   }
@@ -96,6 +97,7 @@ class BrdfRun : public StagedRun {
     const SharedCodebook shared = trained_ != nullptr ? trained_->codebook : SharedCodebook();
     PATINA_TRY(AddBrdfModel(model_, shared, &*staging_));
     manifest_ = DescribeBrdf(job_, source_, model_.shape, shared);
+    manifest_.brdf->rollbacks = model_.rollbacks;
     // So that the decoder can open what was written.
     PATINA_TRY(staging_->WriteManifest(manifest_));
     PATINA_TRY(AddBrdfSampler(&*staging_, &*manifest_.brdf));

@@ -113,7 +113,8 @@ class MaterialRun : public StagedRun {
     recording_seconds_ = model.recording_s;
     if (model.rollbacks > 0) {
       sink_.OnWarning("the training ran into values that are not finite and was set back " +
-                      std::to_string(model.rollbacks) + " times; look at the preview");
+                      std::to_string(model.rollbacks) +
+                      " times, with lower rates; look at the preview");
     }
     model_.emplace(std::move(model));
     return {};

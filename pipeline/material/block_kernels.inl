@@ -109,15 +109,18 @@ PATINA_INLINE void BlockGradient(const float* params, unsigned partition_mask, c
   }
 }
 
-// Returns the new parameters.
+// Returns the new parameters. Adds to `check` a zero, unless a parameter or moment is not finite: limits that are put on
+// parameters afterwards would hide it.
 PATINA_INLINE F16 AdamStep(F16 param, F16 gradient, float* moment1, float* moment2, float rate, float correction1,
-                           float correction2, const AdamRates& rates) {
+                           float correction2, const AdamRates& rates, F16* check) {
   const F16 m = MulAdd(Set(1 - rates.beta1), gradient, Set(rates.beta1) * Load(moment1));
   const F16 v = MulAdd(Set(1 - rates.beta2) * gradient, gradient, Set(rates.beta2) * Load(moment2));
   Store(moment1, m);
   Store(moment2, v);
   const F16 step = Set(rate * correction1) * m / (Sqrt(v * Set(correction2)) + Set(rates.epsilon));
-  return param - step;
+  const F16 updated = param - step;
+  *check = MulAdd(updated + v, Zero(), *check);
+  return updated;
 }
 
 // 1 / (1 - beta^updates), by repeated squaring: the same bits everywhere.
@@ -131,7 +134,7 @@ PATINA_INLINE float BiasCorrection(float beta, int updates) {
 }
 
 template <BlockForm kForm>
-PATINA_INLINE void UpdateBlock(FeatureLevel* level, int block, const F16 gradient[3], const AdamRates& rates) {
+PATINA_INLINE void UpdateBlock(FeatureLevel* level, int block, const F16 gradient[3], const AdamRates& rates, F16* check) {
   constexpr int kStride = BlockStride(kForm);
   float* params = level->params.data() + static_cast<size_t>(block) * kStride;
   float* moment1 = level->moments.data() + static_cast<size_t>(block) * kStride * 2;
@@ -140,14 +143,14 @@ PATINA_INLINE void UpdateBlock(FeatureLevel* level, int block, const F16 gradien
   if (updates < 0xFFFF) ++updates;
   const float c1 = BiasCorrection(rates.beta1, updates), c2 = BiasCorrection(rates.beta2, updates);
   if constexpr (kForm == BlockForm::kSegments) {
-    const F16 endpoints = AdamStep(Load(params), gradient[0], moment1, moment2, rates.endpoint, c1, c2, rates);
+    const F16 endpoints = AdamStep(Load(params), gradient[0], moment1, moment2, rates.endpoint, c1, c2, rates, check);
     Store(params, Min(Max(endpoints, Set(kMinBinade)), Set(kMaxBinade)));
-    const F16 indices = AdamStep(Load(params + 16), gradient[1], moment1 + 16, moment2 + 16, rates.index, c1, c2, rates);
+    const F16 indices = AdamStep(Load(params + 16), gradient[1], moment1 + 16, moment2 + 16, rates.index, c1, c2, rates, check);
     Store(params + 16, Min(Max(indices, Zero()), Set(1.0f)));
   } else {
     Unroll<3>([&](auto c) PATINA_LAMBDA {
       Store(params + c * 16, AdamStep(Load(params + c * 16), gradient[c], moment1 + c * 16, moment2 + c * 16,
-                                      rates.endpoint, c1, c2, rates));
+                                      rates.endpoint, c1, c2, rates, check));
     });
   }
 }

@@ -36,4 +36,32 @@ void FeatureStore::ResetMoments() {
   }
 }
 
+void FeatureSnapshot::Save(const FeatureStore& store, ThreadPool& pool) {
+  constexpr size_t kPiece = size_t{1} << 16;
+  size_t next = 0;
+  for (const auto& texture : store.textures) {
+    for (const FeatureLevel& level : texture) {
+      if (next == params_.size()) params_.emplace_back(level.params.size());
+      float* to = params_[next++].data();
+      const float* from = level.params.data();
+      const size_t count = level.params.size();
+      pool.ParallelFor(static_cast<int>((count + kPiece - 1) / kPiece), [&](int piece, int) {
+        const size_t first = static_cast<size_t>(piece) * kPiece;
+        std::memcpy(to + first, from + first, std::min(kPiece, count - first) * sizeof(float));
+      });
+    }
+  }
+}
+
+void FeatureSnapshot::Restore(FeatureStore* store) const {
+  size_t next = 0;
+  for (auto& texture : store->textures) {
+    for (FeatureLevel& level : texture) {
+      const AlignedBuffer<float>& from = params_[next++];
+      std::memcpy(level.params.data(), from.data(), from.size() * sizeof(float));
+    }
+  }
+  store->ResetMoments();
+}
+
 }  // namespace patina

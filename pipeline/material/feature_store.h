@@ -53,4 +53,15 @@ struct FeatureStore {
   void ResetMoments();
 };
 
+// A copy of a store's parameters, for rolling back; partitions are not in it, which no step changes.
+class FeatureSnapshot {
+ public:
+  void Save(const FeatureStore& store, ThreadPool& pool);
+  // Into the store that was saved; forgets the optimiser's state.
+  void Restore(FeatureStore* store) const;
+
+ private:
+  std::vector<AlignedBuffer<float>> params_;  // of the levels in turn
+};
+
 }  // namespace patina

@@ -1,5 +1,6 @@
 #include "pipeline/material/network.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -40,9 +41,10 @@ bool Network::Step(const MaterialKernels& kernels, std::span<const float> raw_gr
     if (!std::isfinite(gradient_[k])) return false;
   }
   ++updates_;
-  kernels.adam_flat(params_.data(), gradient_.data(), moment1_.data(), moment2_.data(), parameter_count(), updates_, rates);
+  const bool finite = kernels.adam_flat(params_.data(), gradient_.data(), moment1_.data(), moment2_.data(), parameter_count(), updates_, rates);
   Unfold();
-  return true;
+  // Unfolded, a weight may be beyond what a float holds.
+  return finite && std::all_of(raw_.data(), raw_.data() + parameter_count(), [](float w) { return std::isfinite(w); });
 }
 
 void Network::Save() {

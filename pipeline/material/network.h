@@ -27,7 +27,7 @@ class Network {
   const float* raw() const { return raw_.data(); }
   void Unfold();
 
-  // One Adam step from the gradient by the raw parameters. Returns false, changing nothing, if it is not finite.
+  // One Adam step from the gradient by the raw parameters. Returns false if that, or a parameter afterwards, is not finite.
   bool Step(const MaterialKernels& kernels, std::span<const float> raw_gradient, const AdamRates& rates);
 
   // Copies of everything, for rolling back.

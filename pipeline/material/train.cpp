@@ -66,12 +66,10 @@ class Schedule {
 
   double Progress(double samples, double elapsed_s) {
     const double by_samples = samples / end_;
-    if (train_s_ > 0 && elapsed_s / train_s_ > by_samples) {
-      stopped_by_ = "time";
-      progress_ = std::max(progress_, elapsed_s / train_s_);
-    } else {
-      progress_ = std::max(progress_, by_samples);
-    }
+    const double by_time = train_s_ > 0 ? elapsed_s / train_s_ : 0;
+    progress_ = std::max({progress_, by_samples, by_time});
+    // Where both end together the budget of samples was spent, whoever led on the way.
+    if (progress_ >= 1 && !ending_ && by_samples < 0.98) stopped_by_ = "time";
     return progress_;
   }
 
@@ -210,6 +208,18 @@ class Session {
   QualityTrend trend_;
 };
 
+// One step under guard; the trainer's state must have been saved once.
+Status GuardedStep(Trainer* trainer, RateGuard* guard, AdamRates features, AdamRates network, bool accumulate) {
+  const float factor = static_cast<float>(guard->NextFactor());
+  for (float* rate : {&features.endpoint, &features.index, &network.endpoint}) *rate *= factor;
+  if (trainer->Step(features, network, accumulate)) {
+    if (guard->SaveIsDue(trainer->step_error(), trainer->state_bytes())) trainer->Save();
+    return {};
+  }
+  trainer->Rollback();
+  return guard->RolledBack(trainer->samples());
+}
+
 constexpr int kOffGridWindows = 64;
 
 void KeepFloatQuality(Trainer* trainer, FeatureStore* store, const float* network, TrainedMaterial* result) {
@@ -222,9 +232,9 @@ void KeepFloatQuality(Trainer* trainer, FeatureStore* store, const float* networ
 
 // Freezes the exported features, tunes the network on exactly what a decoder sees, and rounds it to the halves that are
 // written; then polishes the coarse levels for just that network; fills the result.
-void FinishNetwork(const MaterialReference& reference, const MaterialKernels& kernels, ThreadPool& pool,
+Status FinishNetwork(const MaterialReference& reference, const MaterialKernels& kernels, ThreadPool& pool,
                    const TrainOptions& options, const WindowDraw& draw, int windows_per_step, double tune_samples,
-                   double rate, int polish_rounds, Exporter* exporter, Network* network, TrainedMaterial* result) {
+                   double rate, int polish_rounds, RateGuard* guard, Exporter* exporter, Network* network, TrainedMaterial* result) {
   FeatureStore decoded;
   exporter->DecodeTo(&decoded);
   Trainer tuner(reference, result->shape, &decoded, network, kernels, pool, options.seed + 1, draw, windows_per_step);
@@ -232,9 +242,10 @@ void FinishNetwork(const MaterialReference& reference, const MaterialKernels& ke
   ModelError error = tuner.Evaluate(&decoded, network->raw(), kOffGridWindows);
   network->Unfold();
   network->Save();
+  const std::vector<float> untuned(network->normalised(), network->normalised() + network->parameter_count());
   while (tuner.samples() < tune_samples && !(options.cancel && options.cancel->cancelled())) {
     const double factor = 0.5 * (1 + std::cos(std::numbers::pi * tuner.samples() / tune_samples));
-    if (!tuner.Step(AdamRates{.endpoint = 0, .index = 0}, NetworkRates(rate * factor), false)) ++result->rollbacks;
+    PATINA_TRY(GuardedStep(&tuner, guard, AdamRates{.endpoint = 0, .index = 0}, NetworkRates(rate * factor), false));
   }
   result->samples += tuner.samples();
   network->RoundRawToHalf();
@@ -244,7 +255,8 @@ void FinishNetwork(const MaterialReference& reference, const MaterialKernels& ke
   if (score(tuned) > score(error)) {
     error = tuned;
   } else {
-    network->Restore();
+    std::copy(untuned.begin(), untuned.end(), network->normalised());
+    network->Unfold();
     network->RoundRawToHalf();
   }
   if (polish_rounds > 0) {
@@ -263,9 +275,10 @@ void FinishNetwork(const MaterialReference& reference, const MaterialKernels& ke
   result->w2.assign(raw + mlp::kW2, raw + mlp::OffsetB2(outputs));
   result->b2.assign(raw + mlp::OffsetB2(outputs), raw + mlp::ParameterCount(outputs));
   result->blocks = exporter->TakeBlocks();
+  return {};
 }
 
-void TrainPatina(const MaterialReference& reference, const MaterialKernels& kernels, const TrainOptions& options,
+Status TrainPatina(const MaterialReference& reference, const MaterialKernels& kernels, const TrainOptions& options,
                  double budget, ThreadPool& pool, Session* session, TrainedMaterial* result) {
   const int mips = static_cast<int>(reference.pyramid.levels.size());
   const ChannelStats stats = MeasureChannels(reference, std::min(1, mips - 1), pool);
@@ -284,28 +297,23 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
   Trainer trainer(reference, result->shape, &store, &network, kernels, pool, options.seed, draw, windows_per_step);
   Exporter exporter(&trainer, result->shape, &store, pool);
   session->Record(&trainer, &store, network.raw());
-  network.Save();
+  trainer.Save();
   size_t next_reencode = 0;
   // Checkpoints at twice the samples each, and more often where a target waits for them.
   const double checkpoint_growth = options.target_psnr_db > 0 || options.quality == Quality::kReference ? std::numbers::sqrt2 : 2;
   const bool quick = options.quality == Quality::kPreview;
   double next_record = quick ? 0.5 : 1.0 / 16;
-  double guard = 1;  // lowers all rates after a step that had to be undone
-  int steps = 0;
+  RateGuard guard(options.rate_fault);
   Schedule schedule(options, budget, ExportSeconds(store, pool.threads()));
   while (!session->cancelled()) {
     const double progress = schedule.Progress(trainer.samples(), session->seconds());
     if (progress >= 1) break;
-    const double factor = guard * CosineRate(progress);
-    if (trainer.Step(FeatureRates(factor), NetworkRates(kNetworkRate * factor), false)) {
-      if (++steps % 64 == 0) network.Save();
-    } else {
-      ++result->rollbacks;
-      guard *= 0.5;
-    }
+    const double factor = CosineRate(progress);
+    PATINA_TRY(GuardedStep(&trainer, &guard, FeatureRates(factor), NetworkRates(kNetworkRate * factor), false));
     if (!quick && next_reencode < std::size(kReencodeAt) && progress >= kReencodeAt[next_reencode]) {
       ++next_reencode;
       exporter.Encode(bc6::Effort::kFull);
+      trainer.Save();
     }
     if (progress >= next_record) {
       schedule.Observe(trainer.samples(), session->Record(&trainer, &store, network.raw()));
@@ -313,14 +321,14 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
       if (schedule.hopeless()) {
         if (options.give_up) {
           result->stopped_by = "hopeless";
-          return;
+          return {};
         }
         session->SayHopeless(progress, schedule.outlook_db());
       }
     }
     session->Report(&trainer, progress);
   }
-  if (session->cancelled()) return;
+  if (session->cancelled()) return {};
   session->Record(&trainer, &store, network.raw());
   result->stopped_by = schedule.stopped_by();
   result->samples = trainer.samples();
@@ -330,8 +338,10 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
     exporter.Refine(0);
     exporter.Refine(1);
   }
-  FinishNetwork(reference, kernels, pool, options, draw, windows_per_step, kTuneShare * budget, kTuneRate, quick ? kQuickPolishRounds : kPolishRounds,
-                &exporter, &network, result);
+  PATINA_TRY(FinishNetwork(reference, kernels, pool, options, draw, windows_per_step, kTuneShare * budget, kTuneRate,
+                           quick ? kQuickPolishRounds : kPolishRounds, &guard, &exporter, &network, result));
+  result->rollbacks = guard.rollbacks();
+  return {};
 }
 
 // The recipe of Weinreich 2024, sections 5.1, 6.1: random start, free texels, then blocks; uniform s, batches of 512 x 512,
@@ -342,8 +352,8 @@ void TrainPatina(const MaterialReference& reference, const MaterialKernels& kern
 // jittered grid over the whole texture; blocks that a batch does not touch are not updated; and sources below 2048 x 2048 get
 // smaller batches in proportion, as they would else get too few iterations from the same samples a texel; and the rates of the
 // block phase fall by e^-4 in all, not the e^-20 of 200,000 iterations, and the network's starts at three times the paper's.
-void TrainPaper(const MaterialReference& reference, const MaterialKernels& kernels, const TrainOptions& options, double budget,
-                ThreadPool& pool, Session* session, TrainedMaterial* result) {
+Status TrainPaper(const MaterialReference& reference, const MaterialKernels& kernels, const TrainOptions& options, double budget,
+                  ThreadPool& pool, Session* session, TrainedMaterial* result) {
   const TargetLevel& base = reference.pyramid.levels[0];
   const int windows_per_batch = static_cast<int>(std::clamp(static_cast<double>(base.width) * base.height / 65536, 4.0, 64.0));
   constexpr double kFreeShare = 5.0 / 205, kTune = 1.0 / 205;
@@ -360,13 +370,15 @@ void TrainPaper(const MaterialReference& reference, const MaterialKernels& kerne
     r.index = static_cast<float>(index);
     return r;
   };
-  const auto run = [&](Trainer* trainer, double samples, double endpoint_rate, double index_rate, double network_rate, double fall) {
-    network.Save();
+  RateGuard guard(options.rate_fault);
+  const auto run = [&](Trainer* trainer, double samples, double endpoint_rate, double index_rate, double network_rate, double fall) -> Status {
+    trainer->Save();
     while (trainer->samples() < samples && !session->cancelled()) {
       const double factor = std::exp(-fall * trainer->samples() / samples);
-      if (!trainer->Step(rates(endpoint_rate * factor, index_rate * factor), rates(network_rate * factor, 0), true)) ++result->rollbacks;
+      PATINA_TRY(GuardedStep(trainer, &guard, rates(endpoint_rate * factor, index_rate * factor), rates(network_rate * factor, 0), true));
       session->Report(trainer, (result->samples + trainer->samples()) / budget);
     }
+    return {};
   };
 
   // At least 300 iterations of the free phase: fewer leave the partitions to chance.
@@ -378,8 +390,8 @@ void TrainPaper(const MaterialReference& reference, const MaterialKernels& kerne
     free_store.Allocate(result->shape, BlockForm::kFree, StoreUse::kAccumulate);
     InitFeaturesAtRandom(&rng, &free_store);
     Trainer trainer(reference, result->shape, &free_store, &network, kernels, pool, options.seed, draw, windows_per_batch);
-    run(&trainer, free_samples, 5e-2, 5e-2, 1e-3, kFreeFall);
-    if (session->cancelled()) return;
+    PATINA_TRY(run(&trainer, free_samples, 5e-2, 5e-2, 1e-3, kFreeFall));
+    if (session->cancelled()) return {};
     session->Record(&trainer, &free_store, network.raw());
     store.Allocate(result->shape, BlockForm::kSegments, StoreUse::kAccumulate);
     InitBlocksFromFreeTexels(free_store, pool, &store);
@@ -388,14 +400,17 @@ void TrainPaper(const MaterialReference& reference, const MaterialKernels& kerne
   Trainer trainer(reference, result->shape, &store, &network, kernels, pool, options.seed + 7, draw, windows_per_batch);
   Exporter exporter(&trainer, result->shape, &store, pool);
   const double block_samples = budget * (1 - kTune) - free_samples;
-  run(&trainer, block_samples, kBlockRate, kBlockRate, 3e-3, kBlockFall);
-  if (session->cancelled()) return;
+  PATINA_TRY(run(&trainer, block_samples, kBlockRate, kBlockRate, 3e-3, kBlockFall));
+  if (session->cancelled()) return {};
   session->Record(&trainer, &store, network.raw());
   result->samples += trainer.samples();
   result->stopped_by = "budget";
   KeepFloatQuality(&trainer, &store, network.raw(), result);
   exporter.EncodeSixBit();
-  FinishNetwork(reference, kernels, pool, options, draw, windows_per_batch, kTune * budget, 1e-3, 0, &exporter, &network, result);
+  PATINA_TRY(FinishNetwork(reference, kernels, pool, options, draw, windows_per_batch, kTune * budget, 1e-3, 0, &guard, &exporter,
+                           &network, result));
+  result->rollbacks = guard.rollbacks();
+  return {};
 }
 
 Status CheckOutputs(int outputs) {
@@ -425,11 +440,8 @@ Result<TrainedMaterial> TrainMaterial(const MaterialReference& reference, const 
   result.outputs = outputs;
   const double budget = SampleBudget(reference, options);
   Session session(options, progress, &result);
-  if (options.recipe == Recipe::kPaper) {
-    TrainPaper(reference, KernelsFor(target), options, budget, pool, &session, &result);
-  } else {
-    TrainPatina(reference, KernelsFor(target), options, budget, pool, &session, &result);
-  }
+  PATINA_TRY(options.recipe == Recipe::kPaper ? TrainPaper(reference, KernelsFor(target), options, budget, pool, &session, &result)
+                                              : TrainPatina(reference, KernelsFor(target), options, budget, pool, &session, &result));
   if (session.cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
   if (result.stopped_by == "hopeless") return result;
   for (const auto* weights : {&result.w1, &result.b1, &result.w2, &result.b2}) {

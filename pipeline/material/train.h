@@ -11,6 +11,7 @@
 #include "formats/base/result.h"
 #include "formats/bc6h.h"
 #include "pipeline/base/progress.h"
+#include "pipeline/base/rate_guard.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/material/target_pyramid.h"
 
@@ -55,6 +56,7 @@ struct TrainOptions {
   bool give_up = false;         // ends without a model (stopped_by "hopeless") once the target is out of reach: see GainToCome
   double samples = 0;           // 0: by quality and size. Otherwise train with exactly this many (rounded up to a step)
   const CancelToken* cancel = nullptr;
+  RateFault rate_fault;         // for tests
 };
 
 // Quality along the way, on texel centres that the estimate visits at a fixed stride; deterministic but for the seconds.
@@ -88,7 +90,7 @@ struct TrainedMaterial {
   double exported_psnr_mean_mips_db = 0;
   double exported_psnr_off_grid_db = 0;
   std::vector<double> float_psnr_mips_db, exported_psnr_mips_db;  // per mip of the source
-  int rollbacks = 0;  // training steps undone because a value was not finite
+  int rollbacks = 0;  // how often training went back to an earlier state because a value was not finite
   double recording_s = 0;  // wall seconds that measuring the curve took
 };
 
@@ -101,7 +103,7 @@ double GainToCome(double progress);
 double SampleBudget(const MaterialReference& reference, const TrainOptions& options);
 
 // Errors: kInvalidArgument (no learned channel, more than kMaxOutputs), kOutOfRange (coded values whose network does not fit
-// half precision), kCancelled, kUnsupported (CPU).
+// half precision; RateGuard::kMaxRollbacks rollbacks), kCancelled, kUnsupported (CPU).
 Result<TrainedMaterial> TrainMaterial(const MaterialReference& reference, const ModelShape& shape,
                                       const TrainOptions& options, ThreadPool& pool, ProgressSink& progress);
 

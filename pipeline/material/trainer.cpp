@@ -1,6 +1,7 @@
 #include "pipeline/material/trainer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
@@ -73,6 +74,14 @@ Trainer::Trainer(const MaterialReference& reference, const ModelShape& shape, Fe
     if (channel.learned_index < 0) continue;
     const double peak = static_cast<double>(CodedPeak(channel));
     error_weight_.push_back(1 / (peak * peak));
+  }
+  state_bytes_ = sizeof(float) * static_cast<size_t>(network->parameter_count());
+  for (const auto& texture : store->textures) {
+    for (const FeatureLevel& level : texture) {
+      if (level.moments.size() == 0) continue;
+      features_learn_ = true;
+      state_bytes_ += sizeof(float) * level.params.size();
+    }
   }
   for (int k = 0; k < pool.threads(); ++k) scratch_.push_back(std::make_unique<WindowScratch>());
   for (Slot& slot : next_slots_) {
@@ -149,7 +158,7 @@ bool Trainer::Step(const AdamRates& features, const AdamRates& network, bool acc
     });
   }
 
-  double samples = 0;
+  double samples = 0, error = 0;
   bool finite = true;
   std::vector<const float*> lanes;
   lanes.reserve(slots_.size());
@@ -157,8 +166,16 @@ bool Trainer::Step(const AdamRates& features, const AdamRates& network, bool acc
     finite &= slot.result.finite;
     samples += slot.result.samples;
     lanes.push_back(slot.result.gradient.sum);
-    for (int c = 0; c < network_->outputs(); ++c) running_error_ += slot.result.squared_error[c];
+    for (int c = 0; c < network_->outputs(); ++c) {
+      running_error_ += slot.result.squared_error[c];
+      error += channel_weight_[c] * slot.result.squared_error[c];
+    }
   }
+  step_error_ = error / samples;
+  // Weighted errors are in units of a channel's range: whatever is a thousand ranges off has run away, and would end in
+  // weights that halves cannot hold.
+  constexpr double kRunAway = 1e6;
+  finite &= step_error_ < kRunAway * network_->outputs();
   running_samples_ += samples;
   samples_ += samples;
   if (finite) {
@@ -169,15 +186,28 @@ bool Trainer::Step(const AdamRates& features, const AdamRates& network, bool acc
     for (auto& texture : store_->textures) {
       for (FeatureLevel& level : texture) {
         constexpr int kPiece = 1024;
+        std::atomic<bool> applied{true};
         pool_.ParallelFor((level.block_count() + kPiece - 1) / kPiece, [&](int piece, int) {
           const int first = piece * kPiece;
-          kernels_.apply_gradient(&level, store_->form, first, std::min(kPiece, level.block_count() - first), features);
+          const int count = std::min(kPiece, level.block_count() - first);
+          if (!kernels_.apply_gradient(&level, store_->form, first, count, features)) applied.store(false, std::memory_order_relaxed);
         });
+        finite &= applied.load();
       }
     }
   }
-  if (!finite) network_->Restore();
   return finite;
+}
+
+void Trainer::Save() {
+  network_->Save();
+  if (features_learn_) saved_features_.Save(*store_, pool_);
+}
+
+void Trainer::Rollback() {
+  network_->Restore();
+  if (features_learn_) saved_features_.Restore(store_);
+  running_error_ = running_samples_ = 0;
 }
 
 double Trainer::TakeRunningError() {

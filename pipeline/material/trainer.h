@@ -44,10 +44,19 @@ class Trainer {
 
   // One step: the windows, their feature updates (features.endpoint 0 and index 0: features stay), one network update.
   // accumulate: feature gradients are summed over the step's windows and applied once at its end.
-  // Returns false when a value was not finite: the network is then back at its last saved state.
+  // Returns false when a loss, gradient, moment or parameter is not finite or the loss has run away: the state is then of no
+  // use and has to be rolled back.
   bool Step(const AdamRates& features, const AdamRates& network, bool accumulate);
 
+  // Save keeps features (where they learn) and network for Rollback, which also forgets the optimiser's state of the features.
+  // The constructor saves nothing; whatever else changes features or network has to save anew.
+  void Save();
+  void Rollback();
+  size_t state_bytes() const { return state_bytes_; }  // of what Save copies
+
   double samples() const { return samples_; }
+  // Weighted squared error of the last step's windows, mean over samples, channels summed.
+  double step_error() const { return step_error_; }
   // Mean squared error of the windows since the last call, averaged over channels and samples as drawn.
   double TakeRunningError();
 
@@ -91,6 +100,10 @@ class Trainer {
   std::vector<Slot> next_slots_;  // planned while this step runs
   std::vector<std::pair<int, int>> groups_;  // [first, last) of slots_
   std::vector<float> gradient_;
+  FeatureSnapshot saved_features_;
+  size_t state_bytes_ = 0;
+  bool features_learn_ = false;
+  double step_error_ = 0;
   double samples_ = 0;
   double running_error_ = 0, running_samples_ = 0;
 };

@@ -42,7 +42,7 @@ struct WindowTask {
 struct alignas(64) WindowResult {
   float squared_error[mlp::kMaxOutputs];  // summed over the window's samples, unweighted
   int samples = 0;
-  bool finite = true;  // false: nothing was updated, the gradient is to be ignored
+  bool finite = true;  // false: an error, or a feature or a moment once updated, is not: the step has to be undone
   mlp::GradientLanes gradient;            // by the network's parameters; loss = sum weight * error^2 / 2
 };
 
@@ -85,9 +85,11 @@ struct MaterialKernels {
   // The filtered target of a window: [row][cols/16][channels][16], coded values. For tests and previews.
   void (*filter_target)(const WindowPlan& plan, WindowScratch* scratch, float* out) noexcept;
   // One Adam step on `count` blocks from FeatureLevel::gradient, which is cleared; blocks with no gradient are skipped.
-  void (*apply_gradient)(FeatureLevel* level, BlockForm form, int first_block, int count, const AdamRates& rates) noexcept;
+  // Returns false if a gradient, or a parameter or moment afterwards, is not finite.
+  bool (*apply_gradient)(FeatureLevel* level, BlockForm form, int first_block, int count, const AdamRates& rates) noexcept;
   // Adam on a flat array of network parameters: rates.endpoint is the step, `updates` counts from 1.
-  void (*adam_flat)(float* params, const float* gradient, float* moment1, float* moment2, int count, int updates,
+  // Returns false if a parameter or moment is not finite afterwards.
+  bool (*adam_flat)(float* params, const float* gradient, float* moment1, float* moment2, int count, int updates,
                     const AdamRates& rates) noexcept;
   // The network alone on one chunk, for tests and the benchmark: forward; forward and backward.
   void (*mlp_forward)(const float* network, int outputs, mlp::Chunk* chunk) noexcept;

@@ -416,9 +416,10 @@ PATINA_INLINE unsigned ValidTexels(const AxisTaps::BlockSpan& xs, const AxisTaps
 }
 
 template <BlockForm kForm>
-PATINA_STAGE void UpdateLevel(const WindowTask& task, const LevelTaps& taps, const float* tile, int first_x, int first_y) {
+PATINA_STAGE void UpdateLevel(const WindowTask& task, const LevelTaps& taps, const float* tile, int first_x, int first_y, F16* check) {
   FeatureLevel* level = taps.level;
   constexpr int kStride = BlockStride(kForm);
+  F16 here = Zero();  // a register: stores to parameters may not alias it
   for (int j = 0; j < taps.y.span_count; ++j) {
     const AxisTaps::BlockSpan& ys = taps.y.spans[j];
     for (int i = 0; i < taps.x.span_count; ++i) {
@@ -431,13 +432,14 @@ PATINA_STAGE void UpdateLevel(const WindowTask& task, const LevelTaps& taps, con
       BlockGradient<kForm>(level->params.data() + static_cast<size_t>(block) * kStride,
                            kPartitionMasks[level->partition[block]], texels, gradient);
       if (task.update == FeatureUpdate::kAdam) {
-        UpdateBlock<kForm>(level, block, gradient, task.rates);
+        UpdateBlock<kForm>(level, block, gradient, task.rates, &here);
       } else {
         float* sum = level->gradient.data() + static_cast<size_t>(block) * kStride;
         Unroll<kStride / 16>([&](auto k) PATINA_LAMBDA { Store(sum + 16 * k, Load(sum + 16 * k) + gradient[k]); });
       }
     }
   }
+  *check = *check + here;
 }
 
 // --- whole windows ---
@@ -519,13 +521,15 @@ PATINA_INLINE void RunWindowAs(const WindowTask& task, WindowScratch* scratch, W
     if (!(result->squared_error[c] < 1e30f)) result->finite = false;
   }
   if (!result->finite || task.update == FeatureUpdate::kNone) return;
+  F16 check = Zero();
   for (int k = 0; k < plan.level_count; ++k) {
     const LevelTaps& taps = plan.levels[k];
     int first_x, first_y;
     const float* tile = ScatterLevel(plan, taps, scratch->input_gradient[0], mlp::kInputs, 3 * taps.texture, 3, scratch,
                                      &first_x, &first_y);
-    UpdateLevel<kForm>(task, taps, tile, first_x, first_y);
+    UpdateLevel<kForm>(task, taps, tile, first_x, first_y, &check);
   }
+  result->finite = ReduceSum(check) == 0.0f;
 }
 
 void RunWindow(const WindowTask& task, WindowScratch* scratch, WindowResult* result) noexcept {
@@ -639,8 +643,9 @@ void Sensitivity(const WindowTask& task, int texture, WindowScratch* scratch, co
 void FilterTargetWindow(const WindowPlan& plan, WindowScratch* scratch, float* out) noexcept { FilterTarget(plan, scratch, out); }
 
 template <BlockForm kForm>
-PATINA_INLINE void ApplyGradientAs(FeatureLevel* level, int first_block, int count, const AdamRates& rates) {
+PATINA_INLINE bool ApplyGradientAs(FeatureLevel* level, int first_block, int count, const AdamRates& rates) {
   constexpr int kStride = BlockStride(kForm);
+  F16 check = Zero();
   for (int block = first_block; block < first_block + count; ++block) {
     float* sum = level->gradient.data() + static_cast<size_t>(block) * kStride;
     F16 gradient[3];
@@ -648,27 +653,30 @@ PATINA_INLINE void ApplyGradientAs(FeatureLevel* level, int first_block, int cou
     Unroll<kStride / 16>([&](auto k) PATINA_LAMBDA {
       gradient[k] = Load(sum + 16 * k);
       any = any || Bits(Abs(gradient[k]) > Zero()) != 0;
+      check = MulAdd(gradient[k], Zero(), check);
       Store(sum + 16 * k, Zero());
     });
-    if (any) UpdateBlock<kForm>(level, block, gradient, rates);
+    if (any) UpdateBlock<kForm>(level, block, gradient, rates, &check);
   }
+  return ReduceSum(check) == 0.0f;
 }
 
-void ApplyGradient(FeatureLevel* level, BlockForm form, int first_block, int count, const AdamRates& rates) noexcept {
+bool ApplyGradient(FeatureLevel* level, BlockForm form, int first_block, int count, const AdamRates& rates) noexcept {
   if (form == BlockForm::kSegments) {
-    ApplyGradientAs<BlockForm::kSegments>(level, first_block, count, rates);
-  } else {
-    ApplyGradientAs<BlockForm::kFree>(level, first_block, count, rates);
+    return ApplyGradientAs<BlockForm::kSegments>(level, first_block, count, rates);
   }
+  return ApplyGradientAs<BlockForm::kFree>(level, first_block, count, rates);
 }
 
 // Arrays are padded to whole vectors by the caller.
-void AdamFlat(float* params, const float* gradient, float* moment1, float* moment2, int count, int updates,
+bool AdamFlat(float* params, const float* gradient, float* moment1, float* moment2, int count, int updates,
               const AdamRates& rates) noexcept {
   const float c1 = BiasCorrection(rates.beta1, updates), c2 = BiasCorrection(rates.beta2, updates);
+  F16 check = Zero();
   for (int k = 0; k < count; k += 16) {
-    Store(params + k, AdamStep(Load(params + k), Load(gradient + k), moment1 + k, moment2 + k, rates.endpoint, c1, c2, rates));
+    Store(params + k, AdamStep(Load(params + k), Load(gradient + k), moment1 + k, moment2 + k, rates.endpoint, c1, c2, rates, &check));
   }
+  return ReduceSum(check) == 0.0f;
 }
 
 void MlpForwardChunk(const float* network, int outputs, mlp::Chunk* chunk) noexcept { MlpForward(network, outputs, chunk); }

@@ -348,8 +348,18 @@ TEST(Manifest, BrdfsReadAndWriteTheSameBytes) {
   ASSERT_OK(small_text);
   EXPECT_FALSE(json::parse(*small_text)["brdf"].contains("codebook"));
   EXPECT_FALSE(json::parse(*small_text)["brdf"].contains("sampler"));
+  EXPECT_FALSE(json::parse(*small_text)["brdf"].contains("rollbacks"));
   EXPECT_EQ(ToJson(*ParseManifest(*small_text)).value(), *small_text);
   ASSERT_OK(CheckAgainstSchema("manifest", json::parse(*small_text)));
+
+  small.brdf->rollbacks = 2;
+  const auto rolled_back = ToJson(small);
+  ASSERT_OK(rolled_back);
+  EXPECT_EQ(json::parse(*rolled_back)["brdf"]["rollbacks"], 2);
+  EXPECT_EQ(ParseManifest(*rolled_back)->brdf->rollbacks, 2);
+  ASSERT_OK(CheckAgainstSchema("manifest", json::parse(*rolled_back)));
+  small.brdf->rollbacks = -1;
+  EXPECT_FALSE(ToJson(small));
 }
 
 TEST(Manifest, WriterAndReaderRefuseBrokenRulesOfBrdfs) {

@@ -100,6 +100,24 @@ TEST(FitTexels, LeavesTheLeastResidualOfAllPartitions) {
   }
 }
 
+// The covariance of equal points is rounding: no variance and products of the axes, whose powers overflow.
+TEST(FitTexels, KeepsItsRangesWhereAllTexelsButOneAreEqual) {
+  Rng rng(9);
+  for (int k = 0; k < 2000; ++k) {
+    const float base[3] = {0.5f + rng.Uniform(), 0.5f + rng.Uniform(), 0.5f + rng.Uniform()};
+    const int other = static_cast<int>(rng.Below(17));  // 16: none
+    float texels[3][16];
+    for (int c = 0; c < 3; ++c) {
+      for (int t = 0; t < 16; ++t) texels[c][t] = base[c] + (t == other ? 0.25f : 0.0f);
+    }
+    const SoftBlock fit = FitTexels(texels);
+    for (const auto& endpoint : fit.endpoint) {
+      for (float e : endpoint) ASSERT_TRUE(e >= 1.0f && e <= 30.9f) << e;
+    }
+    for (float index : fit.index) ASSERT_TRUE(index >= 0.0f && index <= 1.0f) << index;
+  }
+}
+
 TEST(FitTexels, KeepsItsRangesOnAnyInput) {
   const float odd[] = {0.0f,
                        -1.0f,
