@@ -51,6 +51,12 @@ int Dispatch(const CommandLine& line) {
       return SampleCommand(line);
     case Command::kShader:
       return ShaderCommand(line);
+    case Command::kPack:
+      return PackCommand(line, g_cancel);
+    case Command::kUnpackArchive:
+      return UnpackArchiveCommand(line, g_cancel);
+    case Command::kValidate:
+      return ValidateCommand(line, g_cancel);
     case Command::kSubmit:
       return SubmitCommand(line.client, g_cancel);
     case Command::kJobs:

@@ -28,6 +28,8 @@ constexpr const char* kExamples =
     "again\n"
     "  patina eval baked/chrome --pairs pairs.csv       values of a BRDF\n"
     "  patina shader baked/wall --out shaders           what a GPU needs to decode it\n"
+    "  patina pack baked/wall -o wall.patina            a container as one file\n"
+    "  patina validate baked                            check all of them, for CI\n"
     "  patina submit textures/wall --wait               the same by a daemon (see patinad --help)\n"
     "\n"
     "`patina COMMAND --help` explains a command. Exit codes: 0 done, 1 failed, 2 wrong usage, 3 "
@@ -532,6 +534,9 @@ void AddClientCommands(CLI::App* app, CommandLine* line) {
   status->footer("Example:\n  patina status");
 }
 
+#include "pipeline/cli/options_pack.inl"
+#include "pipeline/cli/options_validate.inl"
+
 }  // namespace
 
 ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
@@ -554,6 +559,8 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   AddEval(&app, &line);
   AddSample(&app, &line);
   AddShader(&app, &line);
+  AddPack(&app, &line);
+  AddValidate(&app, &line);
   AddClientCommands(&app, &line);
   std::string topic;
   CLI::App* help = app.add_subcommand("help", "Explain a command");
