@@ -5,7 +5,8 @@ Copies a container until there are --copies of them, then alternates, in one run
   validate   patina validate --jobs 1 on all copies (with --jobs N also on N threads)
   hash       reading every file of them and its SHA-256 (OpenSSL's, as validate uses), on one thread
   start      patina --version: what starting the program costs
-and prints medians and the ratio of validate to hash, with and without the start. The files are in the page cache.
+and prints medians and the ratio of validate to hash, with and without the start, of wall time and of CPU time (which
+others at work on the machine disturb less). The files are in the page cache.
 
 usage: validate_bench.py --container DIR [--patina BIN] [--copies 100] [--rounds 7] [--jobs 2] [--work DIR]
 """
@@ -13,6 +14,7 @@ usage: validate_bench.py --container DIR [--patina BIN] [--copies 100] [--rounds
 import argparse
 import hashlib
 import os
+import resource
 import shutil
 import statistics
 import subprocess
@@ -32,10 +34,17 @@ def hash_all(paths):
                 digest.update(piece)
 
 
+def cpu_seconds():
+    """Of this process and of the children that have ended."""
+    usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
 def seconds(action):
-    start = time.perf_counter()
+    """Wall and CPU seconds."""
+    start, start_cpu = time.perf_counter(), cpu_seconds()
     action()
-    return time.perf_counter() - start
+    return time.perf_counter() - start, cpu_seconds() - start_cpu
 
 
 def main():
@@ -69,15 +78,17 @@ def main():
         for _ in range(options.rounds):
             for name, action in actions.items():
                 times[name].append(seconds(action))
-    medians = {name: statistics.median(values) for name, values in times.items()}
+    medians, cpu = ({name: statistics.median(value[part] for value in values) for name, values in times.items()}
+                    for part in (0, 1))
     print(f"{options.copies} containers of {size / options.copies / 1e6:.2f} MB, {len(paths)} files, "
           f"medians of {options.rounds} rounds")
     for name, median in medians.items():
-        spread = (max(times[name]) - min(times[name])) / median
-        print(f"  {name:12} {median:8.3f} s  {size / median / 1e6:8.0f} MB/s  "
-              f"{1e3 * median / options.copies:8.2f} ms a container  (spread {spread:.0%})")
-    whole, work = medians["validate"], medians["validate"] - medians["start"]
-    print(f"  validate / hash: {whole / medians['hash']:.2f}, without the start {work / medians['hash']:.2f}")
+        walls = [value[0] for value in times[name]]
+        print(f"  {name:12} {median:8.3f} s  {size / median / 1e6:8.0f} MB/s  {1e3 * median / options.copies:8.2f} ms a "
+              f"container, {1e3 * cpu[name] / options.copies:.2f} ms of CPU  (spread {(max(walls) - min(walls)) / median:.0%})")
+    for what, of in (("wall", medians), ("CPU", cpu)):
+        print(f"  validate / hash, {what} time: {of['validate'] / of['hash']:.2f}, "
+              f"without the start {(of['validate'] - of['start']) / of['hash']:.2f}")
 
 
 if __name__ == "__main__":
