@@ -89,6 +89,10 @@ void RemeasureBrdf(const Container& container, const Job& job, ThreadPool& pool,
 
 void Remeasure(const Target& target, const Job& source, ThreadPool& pool, const CancelToken& cancel,
                ProgressSink& progress, FindingList* findings) {
+  if (target.kind == TargetKind::kArchive) {
+    findings->Add(6102, target.label, {},
+                  "archives are not measured; `patina unpack-archive` makes a container of it");
+  }
   if (target.kind != TargetKind::kContainer) return;
   const auto container = OpenContainer(target.path);
   if (!container) return;  // found before

@@ -16,9 +16,9 @@ inline constexpr double kPsnrBoundDb = 0.1;
 // The same of the errors of a BRDF, as a share of the recorded one.
 inline constexpr double kBrdfErrorBound = 0.01;
 
-// Measures a container (nothing for targets of other kinds). `source`: a job, or a folder, or a
-// BRDF's file; of a folder that has one of the asset's name, that one. Also compares the hashes of
-// the inputs.
+// Measures a container (archives are a finding, other targets nothing). `source`: a job, or a
+// folder, or a BRDF's file; of a folder that has one of the asset's name, that one. Also compares
+// the hashes of the inputs.
 void Remeasure(const Target& target, const Job& source, ThreadPool& pool, const CancelToken& cancel,
                ProgressSink& progress, FindingList* findings);
 
