@@ -593,19 +593,35 @@ Result<Codebook> CodebookOf(const IndexPack& pack, const std::string& directory)
     found = ReadFile(path, kMaxIndexPackBytes);
   }
   if (!found) return Fail(std::move(found).error(), "the codebook that the index pack shares");
-  const std::vector<uint8_t>& bytes = *found;
+  return SharedCodebookOf(pack, *found, path);
+}
+
+Result<Codebook> SharedCodebookOf(const IndexPack& pack, std::span<const uint8_t> bytes,
+                                  const std::string& name) {
   const std::string sha256 = Sha256Hex(bytes);
   if (sha256 != pack.codebook_sha256) {
-    return Corrupt(path + " has the SHA-256 " + sha256 + ", the index pack was written for " +
+    return Corrupt(name + " has the SHA-256 " + sha256 + ", the index pack was written for " +
                    pack.codebook_sha256 + "; bake or copy both again");
   }
   auto codebook = ParseCodebook(bytes);
-  if (!codebook) return Fail(std::move(codebook).error(), path);
+  if (!codebook) return Fail(std::move(codebook).error(), name);
   if (codebook->primitive_size != pack.primitive_size) {
-    return Corrupt(path + " has primitives of " + std::to_string(codebook->primitive_size) +
+    return Corrupt(name + " has primitives of " + std::to_string(codebook->primitive_size) +
                    " values, the index pack of " + std::to_string(pack.primitive_size));
   }
   return codebook;
+}
+
+Status CheckIndices(const IndexPack& pack, const Codebook& codebook) {
+  const size_t entries = codebook.halves.size() / static_cast<size_t>(codebook.primitive_size);
+  for (size_t i = 0; i < pack.indices.size(); ++i) {
+    if (pack.indices[i] >= entries) {
+      return Corrupt("bad index " + std::to_string(pack.indices[i]) + " of stored corner " +
+                     std::to_string(i) + ": the codebook has " + std::to_string(entries) +
+                     " entries");
+    }
+  }
+  return {};
 }
 
 void FillDerivedCorners(int nside, int primitive_size, std::span<const uint8_t> stored,
@@ -660,7 +676,7 @@ Result<std::vector<float>> ExpandCorners(const IndexPack& pack, const Codebook& 
                                             " values, more than " +
                                             std::to_string(kMaxExpandedFloats));
   }
-  const size_t entries = codebook.halves.size() / k;
+  PATINA_TRY(CheckIndices(pack, codebook));
   std::vector<float> values(codebook.halves.size());
   for (size_t i = 0; i < values.size(); ++i) values[i] = HalfToFloat(codebook.halves[i]);
   std::vector<float> features(2 * corners * k);
@@ -670,11 +686,6 @@ Result<std::vector<float>> ExpandCorners(const IndexPack& pack, const Codebook& 
     for (size_t c = 0; c < corners; ++c) {
       if (pack.stored[h][c] == 0) continue;
       const size_t index = pack.indices[next++];
-      if (index >= entries) {
-        return Corrupt("bad index " + std::to_string(index) + " of stored corner " +
-                       std::to_string(next - 1) + ": the codebook has " + std::to_string(entries) +
-                       " entries");
-      }
       std::copy_n(values.data() + index * k, k, hemisphere + c * k);
     }
     FillDerivedCorners(pack.nside, pack.primitive_size, pack.stored[h], hemisphere);

@@ -79,6 +79,15 @@ Result<Codebook> ReadCodebook(const std::string& path);
 // kCorruptData if the file is not the one that the pack was written for.
 Result<Codebook> CodebookOf(const IndexPack& pack, const std::string& directory);
 
+// The same from the bytes of the file that the pack names; `name` stands in messages. Errors: those
+// of ParseCodebook; kCorruptData if the file is not the one that the pack was written for.
+Result<Codebook> SharedCodebookOf(const IndexPack& pack, std::span<const uint8_t> bytes,
+                                  const std::string& name);
+
+// Whether all indices are within the codebook, which a pack that shares one cannot tell by itself.
+// Errors: kCorruptData ("bad index").
+Status CheckIndices(const IndexPack& pack, const Codebook& codebook);
+
 // Features of all corners, [2][healpix::CornerCount(nside)][k], derived ones filled from coarse to
 // fine. Errors: kInvalidArgument (a broken rule of IndexPack, another primitive size), kCorruptData
 // ("bad index": beyond the codebook), kOutOfRange (above kMaxExpandedFloats).

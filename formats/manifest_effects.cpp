@@ -38,6 +38,19 @@ ordered_json EffectsToJson(const std::vector<ManifestEffect>& effects) {
   return json;
 }
 
+ordered_json ConstantsToJson(const std::vector<ManifestChannel>& channels) {
+  ordered_json constants = ordered_json::array();
+  for (const ManifestChannel& channel : channels) {
+    if (channel.output >= 0) continue;
+    constants.push_back({{"map", channel.map},
+                         {"component", channel.component},
+                         {"encoding", channel.encoding},
+                         {"value", FloatAsWritten(channel.constant)}});
+    if (channel.scale != 1) constants.back()["scale"] = FloatAsWritten(channel.scale);
+  }
+  return constants;
+}
+
 std::vector<ManifestEffect> EffectsFromJson(const JsonView& manifest) {
   std::vector<ManifestEffect> effects;
   const JsonView list = manifest.Optional("effects");

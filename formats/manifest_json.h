@@ -14,6 +14,9 @@ double FloatAsWritten(float value);
 
 nlohmann::ordered_json EffectsToJson(const std::vector<ManifestEffect>& effects);
 
+// The channels of a material that are numbers, as scene manifests list them.
+nlohmann::ordered_json ConstantsToJson(const std::vector<ManifestChannel>& channels);
+
 // The member "effects"; of older manifests what "left_out" said in its place.
 std::vector<ManifestEffect> EffectsFromJson(const JsonView& manifest);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -71,6 +72,19 @@ std::vector<SchemaFinding> MostSpecific(const std::vector<SchemaFinding>& all) {
   return kept;
 }
 
+// A schema takes longer to parse than a document to check. Validation writes into a parsed schema's
+// caches, hence one for each thread.
+Result<const valijson::Schema*> ParsedSchema(const std::string& schema_name) {
+  thread_local std::map<std::string, valijson::Schema> schemas;
+  const auto known = schemas.find(schema_name);
+  if (known != schemas.end()) return &known->second;
+  PATINA_ASSIGN(const std::string_view text, SchemaText(schema_name));
+  const nlohmann::json document = nlohmann::json::parse(text);
+  valijson::SchemaParser().populateSchema(valijson::adapters::NlohmannJsonAdapter(document),
+                                          schemas[schema_name]);
+  return &schemas[schema_name];
+}
+
 }  // namespace
 
 std::vector<std::string> SchemaNames() {
@@ -88,13 +102,10 @@ Result<std::string_view> SchemaText(const std::string& schema_name) {
 
 Result<std::vector<SchemaFinding>> FindSchemaProblems(const std::string& schema_name,
                                                       const nlohmann::json& document) {
-  PATINA_ASSIGN(const std::string_view text, SchemaText(schema_name));
   PATINA_TRY(CheckLimits(document, 0));
   try {
-    const nlohmann::json schema_document = nlohmann::json::parse(text);
-    valijson::Schema schema;
-    valijson::SchemaParser parser;
-    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_document), schema);
+    PATINA_ASSIGN(const valijson::Schema* parsed, ParsedSchema(schema_name));
+    const valijson::Schema& schema = *parsed;
     valijson::Validator validator;
     valijson::ValidationResults results;
     std::vector<SchemaFinding> findings;

@@ -1,5 +1,6 @@
 #include <map>
 
+#include "formats/container_match.h"
 #include "formats/dds.h"
 #include "formats/half.h"
 #include "formats/healpix_corners.h"
@@ -70,6 +71,8 @@ Status DraftBrdf(ShaderDraft* draft) {
   const ManifestBrdf& brdf = *container.manifest.brdf;
   const std::string grid_path = container.PathOf(brdf.grid);
   PATINA_ASSIGN(const IndexPack pack, ReadIndexPack(grid_path));
+  auto matches = MatchIndexPack(brdf, pack);
+  if (!matches) return Fail(std::move(matches).error(), grid_path);
   PATINA_ASSIGN(const Codebook codebook, CodebookOf(pack, container.directory));
   auto features = ExpandCorners(pack, codebook);
   if (!features) return Fail(std::move(features).error(), grid_path);
@@ -99,7 +102,7 @@ Status DraftBrdf(ShaderDraft* draft) {
   for (int i = 0; i < scalars; ++i) slots.push_back(8 * k4 + i);
   const std::string path = container.PathOf(brdf.network);
   PATINA_ASSIGN(const WeightBuffer buffer, ReadWeights(path));
-  auto layers = DenseLayersOf(buffer, 2 * k + scalars, 3);
+  auto layers = MatchNetwork(container.manifest, buffer);
   if (!layers) return Fail(std::move(layers).error(), path);
   ShaderConstants constants;
   constants.AddLayers(*layers, slots, 2 * k4 + (scalars + 3) / 4);

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "formats/container_match.h"
 #include "formats/dds.h"
 #include "formats/shader_build.h"
 #include "formats/shader_text.h"
@@ -18,18 +19,8 @@ std::string EncodingWord(const ManifestChannel& channel) {
 Status CheckTexture(const Container& container, const ManifestFeature& feature) {
   const std::string path = container.PathOf(feature.payload);
   PATINA_ASSIGN(const DdsTexture texture, ReadDds(path));
-  const bool is_signed = feature.format == "BC6H_SF16";
-  if (texture.width != feature.width || texture.height != feature.height ||
-      texture.levels.size() != static_cast<size_t>(feature.levels) ||
-      (texture.format == bc6h::Format::kSf16) != is_signed) {
-    return Fail(ErrorCode::kCorruptData,
-                path + ": " + std::to_string(texture.width) + "x" + std::to_string(texture.height) +
-                    " texels in " + std::to_string(texture.levels.size()) +
-                    " levels, but the manifest says " + std::to_string(feature.width) + "x" +
-                    std::to_string(feature.height) + ", " + std::to_string(feature.levels) +
-                    " levels, " + feature.format);
-  }
-  return {};
+  auto matches = MatchTexture(feature, texture);
+  return matches ? Status() : Fail(std::move(matches).error(), path);
 }
 
 void ListTexture(ShaderDraft* draft, const ManifestFeature& feature, size_t index) {
@@ -63,12 +54,8 @@ Status DraftNetwork(ShaderDraft* draft) {
   const ManifestNetwork& network = *manifest.network;
   const std::string path = draft->container.PathOf(network.payload);
   PATINA_ASSIGN(const WeightBuffer buffer, ReadWeights(path));
-  auto layers = DenseLayersOf(buffer, network.inputs, network.outputs);
+  auto layers = MatchNetwork(manifest, buffer);
   if (!layers) return Fail(std::move(layers).error(), path);
-  if (layers->size() != 2 || layers->front().outputs != network.hidden) {
-    return Fail(ErrorCode::kCorruptData,
-                path + ": the network is not the one of two layers that the manifest describes");
-  }
   std::string declarations;
   std::vector<float> bias, top;
   for (size_t i = 0; i < manifest.features.size(); ++i) {

@@ -18,6 +18,9 @@ int EvalCommand(const CommandLine& line);
 int SampleCommand(const CommandLine& line);
 int ShaderCommand(const CommandLine& line);
 int TradeoffCommand(const CommandLine& line, const CancelToken& cancel);
+int PackCommand(const CommandLine& line, const CancelToken& cancel);
+int UnpackArchiveCommand(const CommandLine& line, const CancelToken& cancel);
+int ValidateCommand(const CommandLine& line, const CancelToken& cancel);
 
 // "patina: error: <message>" on standard error.
 void PrintError(const std::string& message);

@@ -53,6 +53,12 @@ int Dispatch(const CommandLine& line) {
       return ShaderCommand(line);
     case Command::kTradeoff:
       return TradeoffCommand(line, g_cancel);
+    case Command::kPack:
+      return PackCommand(line, g_cancel);
+    case Command::kUnpackArchive:
+      return UnpackArchiveCommand(line, g_cancel);
+    case Command::kValidate:
+      return ValidateCommand(line, g_cancel);
     case Command::kSubmit:
       return SubmitCommand(line.client, g_cancel);
     case Command::kJobs:

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "formats/container_archive.h"
 #include "pipeline/cli/terminal_progress.h"
 #include "pipeline/client/client_commands.h"
 #include "pipeline/jobs/run_guards.h"
@@ -105,6 +106,27 @@ struct ShaderCommandOptions {
   int first_binding = 0;
 };
 
+struct ValidateArguments {
+  std::vector<std::string> paths;
+  std::string format = "text";          // "text", "json", "junit", "sarif"
+  std::string out;                      // empty: standard output
+  std::string fail_on;                  // empty: the configuration's, or "error"
+  std::vector<std::string> severities;  // "PAT-1104=note"
+  std::string config, baseline, write_baseline;
+  std::string against, inputs;
+  bool current_only = false;
+  bool list_codes = false;
+};
+
+// Of `pack` and `unpack-archive`.
+struct PackArguments {
+  std::string container;
+  std::string archive;  // "-": standard input
+  std::string out;      // "-": standard output, of `pack`
+  int level = kDefaultArchiveLevel;
+  uint64_t max_bytes = kDefaultUnpackedBytes;
+};
+
 enum class Command {
   kBake,
   kRun,
@@ -115,6 +137,9 @@ enum class Command {
   kSample,
   kShader,
   kTradeoff,
+  kValidate,
+  kPack,
+  kUnpackArchive,
   // Of a daemon's client.
   kSubmit,
   kJobs,
@@ -136,6 +161,8 @@ struct CommandLine {
   SampleOptions sample;
   ShaderCommandOptions shader;
   TradeoffOptions tradeoff;
+  ValidateArguments validate;
+  PackArguments pack;
   ClientOptions client;
   bool json = false;
   Verbosity verbosity = Verbosity::kNormal;

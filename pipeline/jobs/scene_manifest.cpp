@@ -47,19 +47,6 @@ class FolderLock {
   int fd_;
 };
 
-Json ConstantsOf(const Manifest& manifest) {
-  Json constants = Json::array();
-  for (const ManifestChannel& channel : manifest.channels) {
-    if (channel.output >= 0) continue;
-    constants.push_back({{"map", channel.map},
-                         {"component", channel.component},
-                         {"encoding", channel.encoding},
-                         {"value", FloatAsWritten(channel.constant)}});
-    if (channel.scale != 1) constants.back()["scale"] = FloatAsWritten(channel.scale);
-  }
-  return constants;
-}
-
 Json MaterialJson(const SceneMaterial& material, const std::string& out,
                   const std::map<std::string, std::string>& problems) {
   Json json;
@@ -83,7 +70,7 @@ Json MaterialJson(const SceneMaterial& material, const std::string& out,
   json["container"] = material.asset + "/" + json["revision"].get<std::string>();
   json["fingerprint"] = manifest.fingerprint;
   json["scene"] = SceneLookToJson(*manifest.scene);
-  json["constants"] = ConstantsOf(manifest);
+  json["constants"] = ConstantsToJson(manifest.channels);
   json["effects"] = EffectsToJson(manifest.effects);
   return json;
 }

@@ -164,7 +164,7 @@ RunRecord StagedRun::RecordSoFar(std::vector<RunCurvePoint> curve) const {
 
 Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {
   const std::string text = RunRecordToJson(RecordSoFar(std::move(curve)));
-  return staging_->AddUnlisted("run.json", AsBytes(text));
+  return staging_->AddUnlisted(kRunRecordName, AsBytes(text));
 }
 
 Status StagedRun::Publish(std::vector<RunCurvePoint> curve) {

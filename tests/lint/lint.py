@@ -22,7 +22,7 @@ PIPELINE_TIERS = {
     "bc6": 2, "color": 2, "effects": 2, "healpix": 2, "image": 2, "metrics": 2, "nn": 2,
     "brdf": 3, "material": 3, "report": 3, "simulate": 3,
     "jobs": 4,
-    "client": 5, "tradeoff": 5,
+    "client": 5, "tradeoff": 5, "validate": 5,
     "cli": 6,
 }
 # The same of daemon/; what lies directly in it (main.cpp) may use all of them.
