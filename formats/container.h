@@ -28,14 +28,14 @@ struct PublishedContainer {
   std::string warning;    // not empty if it is published but may not outlive a power cut
 };
 
-// A container in the making: a hidden directory <out>/<asset>/.staging-<pid>-<n> that belongs to
-// this object, and the lock on the asset. Unless Publish succeeded, destruction removes all traces.
-// Not thread-safe. `files` must outlive it.
 // What a container may hold without listing it, because it differs from run to run.
 inline constexpr const char* kRunRecordName = "run.json";
 inline constexpr const char* kReportPageName = "report.html";
 inline constexpr const char* kUnlistedFiles[] = {kRunRecordName, kReportPageName};
 
+// A container in the making: a hidden directory <out>/<asset>/.staging-<pid>-<n> that belongs to
+// this object, and the lock on the asset. Unless Publish succeeded, destruction removes all traces.
+// Not thread-safe. `files` must outlive it.
 class StagingArea {
  public:
   // Creates <out>/<asset>, locks it against other bakes, and removes what dead ones left behind.

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "formats/half.h"
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/brdf/grid_trainer.h"
 #include "pipeline/brdf/quantiser.h"
 
@@ -82,9 +83,11 @@ class Session {
     for (int step = 0; step < free_steps; ++step) {
       if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
       const float factor = CosineRate(step, free_steps);
-      PATINA_TRY(Step({options_.feature_rate * factor, options_.network_rate * factor, options_.decay}));
+      PATINA_TRY(
+          Step({options_.feature_rate * factor, options_.network_rate * factor, options_.decay}));
       PullToCodes(step, free_steps);
       Report(step, total);
+      RecordSometimes(step + 1, total);
     }
     result_.free_loss = HeldOut();
     Record();
@@ -106,6 +109,7 @@ class Session {
       rates.temperature = 1 - 0.5f * static_cast<float>(step) / static_cast<float>(code_steps);
       PATINA_TRY(Step(rates));
       Report(free_steps + step, total);
+      RecordSometimes(free_steps + step + 1, total);
     }
     result_.used_codes = UsagePerplexity(trainer_.index(), usage_, Codes());
     result_.final_loss = HeldOut();
@@ -254,12 +258,24 @@ class Session {
     progress_.OnProgress(event);
   }
 
+  // At even distances, and twice before the first, where most is learned.
+  void RecordSometimes(int done, int total) {
+    constexpr int kRecords = 16;
+    const int every = std::max(1, total / kRecords);
+    if (done % every == 0 || done == every / 2 || done == every / 4) Record();
+  }
+
+  // Once for a state.
   void Record() {
+    if (!result_.curve.empty() && result_.curve.back().samples == result_.samples) return;
+    const Clock::time_point begin = Clock::now();
     CurvePoint point;
     point.samples = result_.samples;
     point.wall_s = SecondsSince(start_);
+    point.cpu_s = ProcessCpuSeconds() - start_cpu_;
     point.log1p_mae = HeldOut();
     result_.curve.push_back(point);
+    result_.recording_s += SecondsSince(begin);
   }
 
   Result<std::vector<TrainedBrdf>> Finish() {
@@ -376,6 +392,7 @@ class Session {
   std::vector<float> usage_;
   TrainedBrdf result_;
   Clock::time_point start_ = Clock::now();
+  double start_cpu_ = ProcessCpuSeconds();
   Clock::time_point last_report_{};
 };
 

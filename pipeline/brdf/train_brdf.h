@@ -92,6 +92,7 @@ TrainOptions PaperTraining();
 struct CurvePoint {
   double samples = 0;
   double wall_s = 0;
+  double cpu_s = 0;
   // Mean |log1p(f) - log1p(f*)| of held-out samples, cosine-weighted f; of lists, which are too
   // short to hold some back, of the measurements themselves.
   double log1p_mae = 0;
@@ -106,7 +107,8 @@ struct TrainedBrdf {
   double used_codes = 0;  // perplexity
   double free_loss = 0;   // held-out, of the continuous features before they became codes
   double final_loss = 0;
-  int rollbacks = 0;  // how often training went back because a value was not finite
+  double recording_s = 0;  // wall seconds that measuring the curve took
+  int rollbacks = 0;       // how often training went back because a value was not finite
 };
 
 // Errors: kInvalidArgument (a shape out of range), kCorruptData (no valid data), kCancelled,

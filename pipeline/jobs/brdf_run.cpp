@@ -84,6 +84,7 @@ class BrdfRun : public StagedRun {
 
   Status Trained() {
     result_.samples = model_.samples;
+    recording_seconds_ = model_.recording_s;
     result_.stopped_by = "budget";
     if (model_.rollbacks > 0) {
       sink_.OnWarning("the training ran into values that are not finite and was set back " +
@@ -167,7 +168,9 @@ class BrdfRun : public StagedRun {
   std::vector<RunCurvePoint> Curve() const {
     std::vector<RunCurvePoint> curve;
     for (const brdf::CurvePoint& point : model_.curve)
-      curve.push_back({point.samples, point.wall_s, {{"log1p_mae", point.log1p_mae}}});
+      curve.push_back({point.samples,
+                       point.wall_s,
+                       {{"cpu_seconds", point.cpu_s}, {"log1p_mae", point.log1p_mae}}});
     return curve;
   }
 

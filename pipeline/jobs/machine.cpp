@@ -19,12 +19,6 @@ std::string CpuName() {
   return "unknown";
 }
 
-double ProcessCpuSeconds() {
-  timespec t{};
-  if (clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t) != 0) return 0;
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 uint64_t PeakMemoryBytes() {
   std::ifstream file("/proc/self/status");
   std::string line;

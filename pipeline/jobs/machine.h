@@ -9,9 +9,6 @@ namespace patina {
 // The CPU's name as the kernel gives it; "unknown" if it does not.
 std::string CpuName();
 
-// CPU seconds of all threads of this process since it began.
-double ProcessCpuSeconds();
-
 // The most memory this process has had resident since it began, or since the last ResetPeakMemory
 // that worked. 0 if the kernel does not say.
 uint64_t PeakMemoryBytes();

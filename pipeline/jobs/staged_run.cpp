@@ -4,6 +4,7 @@
 #include <new>
 
 #include "formats/base/file_io.h"
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/machine.h"
 #include "pipeline/jobs/report_page.h"

@@ -1,13 +1,12 @@
 #include "pipeline/material/train.h"
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
 #include <numbers>
 
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/material/channel_stats.h"
 #include "pipeline/material/exporter.h"
 #include "pipeline/material/feature_init.h"
@@ -20,13 +19,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-double CpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 // Training effort in samples a texel of the whole pyramid. Quality still grows with the logarithm beyond: see the README.
 double SamplesPerTexel(Quality quality) {
@@ -61,7 +53,12 @@ double CosineRate(double progress) {
 class Schedule {
  public:
   Schedule(const TrainOptions& options, double budget, double reserve_s) : options_(options), end_(budget) {
-    if (options.time_budget_s > 0) train_s_ = std::max(0.2 * options.time_budget_s, options.time_budget_s - reserve_s);
+    Reserve(reserve_s);
+  }
+
+  // The export as it is now expected to take.
+  void Reserve(double reserve_s) {
+    if (options_.time_budget_s > 0) train_s_ = std::max(0.2 * options_.time_budget_s, options_.time_budget_s - reserve_s);
   }
 
   double Progress(double samples, double elapsed_s) {
@@ -115,7 +112,10 @@ class Schedule {
   const char* stopped_by_ = "budget";
 };
 
-// Seconds that the export will take: a block costs about 50 microseconds of one core in all passes.
+// What the export of a training takes beside the tuning of the network, in re-encodes on the way.
+constexpr double kExportPerEncode = 4;
+
+// Seconds that the export will take, before a re-encode has shown how fast the machine is: a block costs about 50 microseconds of one core in all passes.
 double ExportSeconds(const FeatureStore& store, int threads) {
   double blocks = 0;
   for (const auto& texture : store.textures) {
@@ -147,7 +147,7 @@ AdamRates NetworkRates(double rate) {
 class Session {
  public:
   Session(const TrainOptions& options, ProgressSink& progress, TrainedMaterial* result)
-      : options_(options), progress_(progress), result_(result), start_(Clock::now()), start_cpu_(CpuSeconds()) {}
+      : options_(options), progress_(progress), result_(result), start_(Clock::now()), start_cpu_(ProcessCpuSeconds()) {}
 
   bool cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
   double seconds() const { return SecondsSince(start_); }
@@ -188,7 +188,7 @@ class Session {
     CurvePoint point;
     point.samples = trainer->samples();
     point.wall_s = seconds();
-    point.cpu_s = CpuSeconds() - start_cpu_;
+    point.cpu_s = ProcessCpuSeconds() - start_cpu_;
     point.psnr_mip0_db = error.MipPsnr(0);
     point.psnr_mean_mips_db = error.MeanMipsPsnr();
     for (const double mse : error.mip_mse[0]) point.psnr_channels_db.push_back(PsnrOfMse(mse));
@@ -312,7 +312,9 @@ Status TrainPatina(const MaterialReference& reference, const MaterialKernels& ke
     PATINA_TRY(GuardedStep(&trainer, &guard, FeatureRates(factor), NetworkRates(kNetworkRate * factor), false));
     if (!quick && next_reencode < std::size(kReencodeAt) && progress >= kReencodeAt[next_reencode]) {
       ++next_reencode;
+      const double begin = session->seconds(), rate = trainer.samples() / begin;
       exporter.Encode(bc6::Effort::kFull);
+      schedule.Reserve(kExportPerEncode * (session->seconds() - begin) + kTuneShare * budget / rate);
       trainer.Save();
     }
     if (progress >= next_record) {
