@@ -115,7 +115,7 @@ class Checker {
       }
     }
     if (sum > 1 + 1e-9) {
-      Complain("/base/parts", "the weights sum to " + Number(sum) +
+      Complain("/base/parts", "the weights sum to " + Number(std::round(sum * 1e9) / 1e9) +
                                   ", so the base would make light; let them sum to at most 1");
     }
   }

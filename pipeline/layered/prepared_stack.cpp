@@ -64,6 +64,7 @@ PreparedPart PreparePart(const BasePart& given, double ior_above, Effects* effec
     effects->colour = effects->colour || Differ(part.eta) || Differ(part.k);
     effects->anisotropic = effects->anisotropic || given.roughness.anisotropic();
   }
+  for (double& albedo : part.albedo) albedo *= part.weight;
   return part;
 }
 

@@ -47,7 +47,7 @@ struct PreparedPart {
   BaseKind kind = BaseKind::kDiffuse;
   double weight = 0;
   double share = 1;  // of the samples
-  double albedo[3] = {0, 0, 0};
+  double albedo[3] = {0, 0, 0};  // times the weight
   double eta[3] = {1, 1, 1}, k[3] = {0, 0, 0};  // relative to the last layer
   PreparedSurface surface;
 };

@@ -13,6 +13,9 @@
 #include "pipeline/base/rng.h"
 #include "pipeline/layered/prepared_stack.h"
 
+// Inlined into one function, so that the state of a walk stays in registers.
+#define PATINA_WALK_INLINE [[gnu::always_inline]]
+
 namespace patina::layered {
 
 // Walks that lose nothing in thick layers end here. Their share is below any error bar.
@@ -26,7 +29,7 @@ inline double Uniform(Rng* rng) { return static_cast<double>(rng->Next() >> 11) 
 template <class E>
 struct Colour {
   static constexpr int kChannels = E::kColour ? 3 : 1;
-  double v[kChannels];
+  double v[kChannels] = {};
 
   double Max() const {
     double max = v[0];
@@ -43,15 +46,15 @@ template <class E>
 struct WayOut {
   static constexpr int kSegments = E::kDeep ? kMaxLayers : 1;
   int layers = 0;  // that it reaches; total reflection may end it
-  Vec direction[kSegments];
+  Vec direction[kSegments] = {};
   // What light of unit density in `direction`, below the upper surface of a layer, adds to f.
-  Colour<E> gain[kSegments];
-  Colour<E> transmittance[kSegments];  // of the whole layer
-  double reach[kSegments];             // chance of a walk to cross the whole layer
-  double inverse_pdf[kSegments];       // of the direction in this path; 1 below a smooth surface
+  Colour<E> gain[kSegments] = {};
+  Colour<E> transmittance[kSegments] = {};  // of the whole layer
+  double reach[kSegments] = {};             // chance of a walk to cross the whole layer
+  double inverse_pdf[kSegments] = {};  // of the direction in this path; 1 below a smooth surface
   // The density of the other ways over the surfaces above, each over that of going over to this
   // path in this segment, which `inverse_pdf` and the walk's own density precede.
-  double odds[kSegments];
+  double odds[kSegments] = {};
 };
 
 template <class E>
@@ -101,7 +104,7 @@ class Kernel {
       if (part.kind == BaseKind::kDiffuse) {
         const double lobe = r.z / kPi;
         pdf += part.share * lobe;
-        for (int c = 0; c < kChannels; ++c) value[c] += part.weight * part.albedo[c] * lobe;
+        for (int c = 0; c < kChannels; ++c) value[c] += part.albedo[c] * lobe;
       } else if (!part.surface.smooth) {
         const FacetReflection lobe = EvaluateReflection(part.surface.ggx, ToFrame(part.surface, w),
                                                         ToFrame(part.surface, r));
@@ -122,6 +125,8 @@ class Kernel {
 
   static bool Smooth(const PreparedSurface& surface) {
     if constexpr (!E::kRough) return true;
+    // The only surface is the rough one.
+    if constexpr (!E::kDeep && !E::kAnisotropic) return false;
     return surface.smooth;
   }
   static Vec ToFrame(const PreparedSurface& s, const Vec& w) {
@@ -193,7 +198,7 @@ class Kernel {
     }
     bool Crosses(const Vec& t) const { return cos_t > 0 && cosine > 0 && t.z < 0; }
   };
-  Facet DrawFacet(const Ggx& ggx, const Vec& w, double eta) {
+  PATINA_WALK_INLINE Facet DrawFacet(const Ggx& ggx, const Vec& w, double eta) {
     Facet facet;
     const double u0 = Uniform(&rng_), u1 = Uniform(&rng_);
     facet.m = ggx.SampleVisible(w, u0, u1);
@@ -217,7 +222,7 @@ class Kernel {
     return f;
   }
 
-  void StartWayOut(const Vec& wo) {
+  PATINA_WALK_INLINE void StartWayOut(const Vec& wo) {
     out_.layers = 0;
     Vec w = wo;
     Colour<E> gain = One();
@@ -271,9 +276,11 @@ class Kernel {
   // way's direction, density per solid angle, times what is left of it at the layer's upper
   // surface; pdf: the walk's density of this direction; reach: its chance to get to that surface;
   // links: density of the ways that went over earlier, over that of this one.
-  void Connect(int layer, const double* value, double pdf, double reach, double links) {
-    const double later =
-        pdf * reach * out_.inverse_pdf[layer] * (Connectable(layer) + out_.odds[layer]);
+  PATINA_WALK_INLINE void Connect(int layer, const double* value, double pdf, double reach,
+                                  double links) {
+    double later = pdf * out_.inverse_pdf[layer] * Connectable(layer);
+    if constexpr (E::kDeep) later += pdf * out_.inverse_pdf[layer] * out_.odds[layer];
+    if constexpr (E::kScattering) later *= reach;
     const double weight = 1 / (1 + links + later);
     for (int c = 0; c < kChannels; ++c)
       total_.v[c] += light_.v[c] * value[c] * out_.gain[layer].v[c] * weight;
@@ -281,7 +288,7 @@ class Kernel {
   bool HasWayOut(int layer) const { return E::kConnect && layer < out_.layers; }
 
   // The walk gets through the uppermost surface. False: nothing does.
-  bool Enter(const Vec& wi) {
+  PATINA_WALK_INLINE bool Enter(const Vec& wi) {
     light_ = One();
     events_ = 1;
     const PreparedInterface& top = stack_.interfaces[0];
@@ -317,9 +324,12 @@ class Kernel {
     if (MeetBase()) Leave();
   }
 
-  void Walk() {
+  PATINA_WALK_INLINE void Walk() {
     for (;;) {
-      if (events_ >= kMaxEvents || !(light_.Max() > 0)) return;
+      if (!(light_.Max() > 0)) return;
+      if constexpr (E::kScattering) {
+        if (events_ >= kMaxEvents) return;
+      }
       if (events_ >= kEventsBeforeRoulette && light_.Max() < kRouletteBelow) {
         const double survival = light_.Max() / kRouletteBelow;
         if (!(Uniform(&rng_) < survival)) return;
@@ -333,7 +343,7 @@ class Kernel {
       } else if (layer_ == LastLayer()) {
         goes_on = MeetBase();
       } else {
-        goes_on = MeetFromAbove(layer_ + 1);
+        goes_on = MeetNextSurface();
       }
       if (!goes_on) return;
     }
@@ -431,17 +441,26 @@ class Kernel {
     return true;
   }
 
-  bool MeetBase() {
+  PATINA_WALK_INLINE bool MeetBase() {
     ++events_;
     if (stack_.parts == 0) return false;
     const Vec w = -direction_;
     const int layer = layer_;
     const bool single = stack_.parts == 1;
+    const bool diffuse = single && stack_.base[0].kind == BaseKind::kDiffuse;
     if (HasWayOut(layer)) {
       const Vec& o = out_.direction[layer];
       double value[kChannels];
-      const double pdf = EvaluateBase(stack_, w, o, value);
-      for (int c = 0; c < kChannels; ++c) value[c] *= out_.transmittance[layer].v[c];
+      double pdf = o.z / kPi;
+      if (diffuse) {
+        const PreparedPart& part = stack_.base[0];
+        for (int c = 0; c < kChannels; ++c) value[c] = part.albedo[c] * pdf;
+      } else {
+        pdf = EvaluateBase(stack_, w, o, value);
+      }
+      if constexpr (E::kAbsorption) {
+        for (int c = 0; c < kChannels; ++c) value[c] *= out_.transmittance[layer].v[c];
+      }
       if (pdf > 0) Connect(layer, value, pdf, out_.reach[layer], 0);
     }
     int chosen = 0;
@@ -476,9 +495,9 @@ class Kernel {
     }
     only_smooth_ = false;
     links_ = 1;
-    if (single && part.kind == BaseKind::kDiffuse) {
+    if (diffuse) {
       pdf_ = direction_.z / kPi;
-      for (int c = 0; c < kChannels; ++c) light_.v[c] *= part.weight * part.albedo[c];
+      for (int c = 0; c < kChannels; ++c) light_.v[c] *= part.albedo[c];
       return true;
     }
     double value[kChannels];
@@ -486,6 +505,11 @@ class Kernel {
     if (!(pdf_ > 0)) return false;
     for (int c = 0; c < kChannels; ++c) light_.v[c] *= value[c] / pdf_;
     return true;
+  }
+
+  bool MeetNextSurface() {
+    if constexpr (E::kDeep) return MeetFromAbove(layer_ + 1);
+    return false;
   }
 
   // Surface i, from the layer above it.
@@ -552,7 +576,7 @@ class Kernel {
   }
 
   // The surface on top of the current layer, from below.
-  bool MeetFromBelow() {
+  PATINA_WALK_INLINE bool MeetFromBelow() {
     ++events_;
     const int i = layer_;
     const PreparedInterface& interface = stack_.interfaces[i];
@@ -607,7 +631,7 @@ class Kernel {
 
   // Goes over to the way out at the rough surface i, from below. w: in the surface's frame, as if
   // from above.
-  void ConnectAcross(int i, const Vec& w, double eta, double links) {
+  PATINA_WALK_INLINE void ConnectAcross(int i, const Vec& w, double eta, double links) {
     const PreparedSurface& surface = stack_.interfaces[i].surface;
     const Vec t = ToFrame(surface, Flipped(i == 0 ? wo_ : out_.direction[i - 1]));
     const FacetCrossing crossing = EvaluateCrossing(surface.ggx, w, t, eta);
@@ -642,3 +666,5 @@ class Kernel {
 };
 
 }  // namespace patina::layered
+
+#undef PATINA_WALK_INLINE
