@@ -143,6 +143,12 @@ class Kernel {
     return stack_.layers - 1;
   }
 
+  // The layer that the walk is in.
+  int CurrentLayer() const {
+    if constexpr (!E::kDeep) return 0;
+    return layer_;
+  }
+
   static Colour<E> One() {
     Colour<E> one;
     for (int c = 0; c < kChannels; ++c) one.v[c] = 1;
@@ -340,7 +346,7 @@ class Kernel {
         goes_on = Scatter();
       } else if (direction_.z > 0) {
         goes_on = MeetFromBelow();
-      } else if (layer_ == LastLayer()) {
+      } else if (CurrentLayer() == LastLayer()) {
         goes_on = MeetBase();
       } else {
         goes_on = MeetNextSurface();
@@ -351,7 +357,7 @@ class Kernel {
 
   // To the next event. True: it is inside the medium; false: at the layer's border.
   bool Fly() {
-    const PreparedMedium& medium = stack_.media[layer_];
+    const PreparedMedium& medium = stack_.media[CurrentLayer()];
     reached_ = 1;
     if constexpr (E::kAbsorption) {
       if (medium.extinguishes) {
@@ -365,7 +371,7 @@ class Kernel {
           light_.v[c] *= ExpOfNegative(-medium.extinction[c] * border);
       }
     }
-    depth_ = direction_.z > 0 ? 0 : medium.thickness;
+    if constexpr (E::kAbsorption) depth_ = direction_.z > 0 ? 0 : medium.thickness;
     return false;
   }
 
@@ -408,17 +414,18 @@ class Kernel {
   }
 
   bool Scatter() {
-    const PreparedMedium& medium = stack_.media[layer_];
+    const int layer = CurrentLayer();
+    const PreparedMedium& medium = stack_.media[layer];
     ++events_;
     only_smooth_ = false;
     const double g = medium.asymmetry;
-    if (HasWayOut(layer_)) {
-      const Vec& o = out_.direction[layer_];
+    if (HasWayOut(layer)) {
+      const Vec& o = out_.direction[layer];
       const double pdf = Phase(g, Dot(direction_, o));
       const double distance = Along(depth_, o.z);
       Colour<E> value = Transmittance(medium, distance);
       value.Scale(pdf);
-      Connect(layer_, value.v, pdf, Reach(medium, distance), 0);
+      Connect(layer, value.v, pdf, Reach(medium, distance), 0);
     }
     const double u = Uniform(&rng_);
     double cosine = 1 - 2 * u;
@@ -443,9 +450,10 @@ class Kernel {
 
   PATINA_WALK_INLINE bool MeetBase() {
     ++events_;
-    if (stack_.parts == 0) return false;
+    if (stack_.parts == 0) [[unlikely]]
+      return false;
     const Vec w = -direction_;
-    const int layer = layer_;
+    const int layer = CurrentLayer();
     const bool single = stack_.parts == 1;
     const bool diffuse = single && stack_.base[0].kind == BaseKind::kDiffuse;
     if (HasWayOut(layer)) {
@@ -578,7 +586,7 @@ class Kernel {
   // The surface on top of the current layer, from below.
   PATINA_WALK_INLINE bool MeetFromBelow() {
     ++events_;
-    const int i = layer_;
+    const int i = CurrentLayer();
     const PreparedInterface& interface = stack_.interfaces[i];
     const double eta = 1 / interface.eta;
     const Vec w = Flipped(-direction_);  // as if from above

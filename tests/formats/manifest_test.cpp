@@ -351,6 +351,8 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRulesOfBrdfs) {
       {"/brdf", [](Manifest* m) { m->kind = "material"; }},
       {"/kind", [](Manifest* m) { m->maps.resize(1); }},
       {"/source/format", [](Manifest* m) { m->brdf->source_format = ""; }},
+      {"/source/simulation/standard_error",
+       [](Manifest* m) { m->brdf->simulation.emplace().standard_error = -1; }},
       {"/source/invalid_cells", [](Manifest* m) { m->brdf->invalid_cells = 1458001; }},
       {"/source/files/0/path", [](Manifest* m) { m->brdf->files[0].path = "../x"; }},
       {"/source/files/0/sha256", [](Manifest* m) { m->brdf->files[0].sha256 = "5"; }},
