@@ -29,6 +29,9 @@ Rng PairRng(const brdf::Direction& wi, const brdf::Direction& wo, uint64_t seed,
   return Rng(Rng(seed, Bits(wi)).Next() + purpose, Bits(wo));
 }
 
+// Paths of an estimate for each of its pilot's, at the most.
+constexpr double kMostOverPilot = 4;
+
 Estimate Mean(const double sum[3], const double squares[3], int paths) {
   Estimate estimate;
   estimate.paths = estimate.spent = paths;
@@ -105,14 +108,20 @@ Estimate Simulator::Evaluate(const brdf::Direction& wi, const brdf::Direction& w
   if (closed_form()) return Average(wi, wo, 2, seed);
   double sum[3] = {0, 0, 0}, squares[3] = {0, 0, 0};
   Rng rng = PairRng(wi, wo, seed, 0);
-  AddPaths(wi, wo, accuracy.pilot_paths, &rng, sum, squares);
-  const double error = StandardError(Mean(sum, squares, accuracy.pilot_paths), wi, wo);
-  const double ratio = error / accuracy.standard_error;
-  const double wanted = accuracy.pilot_paths * ratio * ratio;
-  const int paths = static_cast<int>(std::clamp(wanted, static_cast<double>(accuracy.min_paths),
-                                                static_cast<double>(accuracy.max_paths)));
-  Estimate estimate = Average(wi, wo, paths, seed);
-  estimate.spent += accuracy.pilot_paths;
+  int pilot = accuracy.pilot_paths;
+  AddPaths(wi, wo, pilot, &rng, sum, squares);
+  double wanted = 0;
+  for (;;) {
+    const double ratio = StandardError(Mean(sum, squares, pilot), wi, wo) / accuracy.standard_error;
+    wanted = std::clamp(pilot * ratio * ratio, static_cast<double>(accuracy.min_paths),
+                        static_cast<double>(accuracy.max_paths));
+    // Few paths say little of the variance of many: rare bright ones are missing among them.
+    if (wanted <= kMostOverPilot * pilot) break;
+    AddPaths(wi, wo, pilot, &rng, sum, squares);
+    pilot *= 2;
+  }
+  Estimate estimate = Average(wi, wo, static_cast<int>(wanted), seed);
+  estimate.spent += pilot;
   return estimate;
 }
 

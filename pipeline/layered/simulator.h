@@ -24,11 +24,12 @@ struct Estimate {
   int spent = 0;                               // with those that only told how many are needed
 };
 
-// When an estimate is good enough. The error of f is counted as the trainer counts it, as that of
-// log(1 + f c), c the larger cosine of the two directions, in the worst channel.
+// When an estimate is good enough, as far as its pilot tells: rare bright paths may be missing
+// there, so that single estimates are worse. The error of f is counted as the trainer counts it, as
+// that of log(1 + f c), c the larger cosine of the two directions, in the worst channel.
 struct Accuracy {
   double standard_error = 0.01;
-  int pilot_paths = 32;  // two or more; they say how many are needed, and are not part of f
+  int pilot_paths = 32;  // at first; two or more. They say how many f takes, and are no part of it
   int min_paths = 32;    // two or more
   int max_paths = 4096;
 };
@@ -54,8 +55,9 @@ class Simulator {
   Estimate Average(const brdf::Direction& wi, const brdf::Direction& wo, int paths,
                    uint64_t seed) const;
 
-  // As many paths as the accuracy asks for. The number follows from a pilot whose paths are not
-  // used again, so that the mean stays unbiased. The same for a seed and a pair of directions.
+  // As many paths as the accuracy asks for. The number follows from a pilot, of a quarter as
+  // many at the least, whose paths are not used again, so that the mean stays unbiased. The same
+  // for a seed and a pair of directions.
   Estimate Evaluate(const brdf::Direction& wi, const brdf::Direction& wo, const Accuracy& accuracy,
                     uint64_t seed) const;
 

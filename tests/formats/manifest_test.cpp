@@ -408,6 +408,16 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRulesOfBrdfs) {
   EXPECT_EQ(ParseManifest(document.dump()).error().code, ErrorCode::kUnsupported);
 }
 
+TEST(ManifestBrdf, KeepsHowItsSourceWasSimulated) {
+  const auto text = ReadTextFile(ExamplePath("manifest_brdf_layered.json"), kMaxManifestBytes);
+  ASSERT_OK(text);
+  const auto manifest = ParseManifest(*text);
+  ASSERT_OK(manifest);
+  ASSERT_TRUE(manifest->brdf->simulation.has_value());
+  EXPECT_EQ(manifest->brdf->simulation->paths, 9437184u);
+  EXPECT_EQ(json::parse(*ToJson(*manifest))["source"], json::parse(*text)["source"]);
+}
+
 // schemas/examples/manifest_invalid_*.json break the schema; the other manifest_*.json satisfy
 // schema and reader.
 TEST(ManifestSchema, AgreesWithItsExamples) {

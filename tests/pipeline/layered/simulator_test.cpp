@@ -319,7 +319,8 @@ TEST(LayeredSimulator, PathsGoWhereTheVarianceIs) {
     const Estimate estimate = simulator.Evaluate(wi, wo, accuracy, 1);
     least = std::min(least, estimate.paths);
     most = std::max(most, estimate.paths);
-    EXPECT_EQ(estimate.spent, estimate.paths + accuracy.pilot_paths);
+    EXPECT_GE(estimate.spent, estimate.paths + accuracy.pilot_paths);
+    EXPECT_GE(4 * (estimate.spent - estimate.paths), estimate.paths);
     const double error = Simulator::StandardError(estimate, wi, wo);
     stated.Add(error * error);
     EXPECT_EQ(estimate.f, simulator.Evaluate(wi, wo, accuracy, 1).f);
@@ -327,8 +328,8 @@ TEST(LayeredSimulator, PathsGoWhereTheVarianceIs) {
   }
   EXPECT_EQ(least, accuracy.min_paths);
   EXPECT_GT(most, 10 * accuracy.min_paths);
-  // Pilots of 32 paths mistake the variance of single pairs, not that of all.
-  EXPECT_LT(std::sqrt(stated.mean()), 1.5 * accuracy.standard_error);
+  // Pilots mistake the variance of single pairs, not that of all.
+  EXPECT_LT(std::sqrt(stated.mean()), 1.3 * accuracy.standard_error);
 }
 
 TEST(LayeredSimulator, NothingBelowTheHorizon) {
