@@ -199,6 +199,14 @@ ordered_json BrdfSourceToJson(const ManifestBrdf& brdf) {
   json["format"] = brdf.source_format;
   json["cells"] = brdf.cells;
   json["invalid_cells"] = brdf.invalid_cells;
+  if (brdf.simulation) {
+    ordered_json& simulation = json["simulation"];
+    simulation["pairs"] = brdf.simulation->pairs;
+    simulation["paths"] = brdf.simulation->paths;
+    simulation["standard_error"] = brdf.simulation->standard_error;
+    simulation["effects"] = brdf.simulation->effects;
+    simulation["left_out"] = brdf.simulation->left_out;
+  }
   json["files"] = ordered_json::array();
   for (const ManifestBrdfFile& file : brdf.files) {
     ordered_json entry;
@@ -437,6 +445,18 @@ void ReadBrdfSource(const JsonView& json, ManifestBrdf* brdf) {
   brdf->source_format = json.Field("format").String();
   brdf->cells = json.Field("cells").Unsigned();
   brdf->invalid_cells = json.Field("invalid_cells").Unsigned();
+  if (const JsonView simulation = json.Optional("simulation")) {
+    ManifestSimulation& read = brdf->simulation.emplace();
+    read.pairs = simulation.Field("pairs").Unsigned();
+    read.paths = simulation.Field("paths").Unsigned();
+    read.standard_error = simulation.Field("standard_error").Number();
+    const auto names = [&](const char* key, std::vector<std::string>* list) {
+      simulation.Field(key).ForEach(
+          kMaxEntries, [&](const JsonView& name) { list->push_back(name.String()); });
+    };
+    names("effects", &read.effects);
+    names("left_out", &read.left_out);
+  }
   json.Field("files").ForEach(kMaxEntries, [&](const JsonView& entry) {
     brdf->files.push_back({entry.Field("path").String(), entry.Field("sha256").String()});
   });

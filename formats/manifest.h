@@ -225,12 +225,21 @@ struct ManifestBrdfQuality {
   std::vector<ManifestAlbedo> albedo;
 };
 
+// How a source was simulated rather than measured.
+struct ManifestSimulation {
+  uint64_t pairs = 0;         // of directions
+  uint64_t paths = 0;         // of light
+  double standard_error = 0;  // root mean square over the pairs, of log(1 + f c)
+  std::vector<std::string> effects, left_out;  // in words
+};
+
 // What a container of kind "brdf" has instead of textures, channels and maps.
 struct ManifestBrdf {
   // The source.
-  std::string source_format;   // "merl", "rgl", "utia", "sparse", ...
+  std::string source_format;   // "merl", "rgl", "utia", "sparse", "layered", ...
   uint64_t cells = 0;          // colours in the file
   uint64_t invalid_cells = 0;  // of those, the ones that were left out
+  std::optional<ManifestSimulation> simulation;  // of a layered material
   std::vector<ManifestBrdfFile> files;
   // The model; what repeats the index pack's header is the same as there.
   std::string grid;      // name of the payload of role "grid"

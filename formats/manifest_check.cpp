@@ -379,6 +379,10 @@ Status CheckBrdf(const Manifest& manifest) {
   if (brdf.invalid_cells > brdf.cells)
     return Bad("/source/invalid_cells",
                std::to_string(brdf.invalid_cells) + " of " + std::to_string(brdf.cells) + " cells");
+  if (brdf.simulation &&
+      !(std::isfinite(brdf.simulation->standard_error) && brdf.simulation->standard_error >= 0)) {
+    return Bad("/source/simulation/standard_error", "not a finite number of 0 or more");
+  }
   for (size_t i = 0; i < brdf.files.size(); ++i) {
     const Pointer at = "/source/files/" + std::to_string(i);
     if (auto status = CheckRelativePath(brdf.files[i].path, at + "/path:"); !status) return status;

@@ -12,6 +12,7 @@
 #include "formats/base/file_io.h"
 #include "formats/base/sha256.h"
 #include "formats/brdf/brdf_source.h"
+#include "formats/layered/layered_file.h"
 #include "formats/scene/scene.h"
 #include "pipeline/image/map_name.h"
 
@@ -35,6 +36,8 @@ bool IsLegal(char c) {
 }
 
 std::string WithoutExtension(const std::string& path) {
+  if (layered::IsLayersFileName(path))
+    return path.substr(0, path.size() - layered::kLayersSuffix.size());
   const size_t slash = path.rfind('/');
   const size_t begin = slash == std::string::npos ? 0 : slash + 1;
   const size_t dot = path.rfind('.');

@@ -34,15 +34,42 @@ class Table {
   // the horizon; rgb is then zero. Values are finite; noise of the measurement may make them
   // negative. Thread-safe.
   virtual bool Evaluate(const Direction& wi, const Direction& wo, float rgb[3]) const = 0;
+
+  // The same to learn from. weight: how much the value is to count beside others, above 0, at most
+  // 1; less where it is noisy.
+  virtual bool EvaluateToLearn(const Direction& wi, const Direction& wo, float rgb[3],
+                               float* weight) const {
+    *weight = 1;
+    return Evaluate(wi, wo, rgb);
+  }
+};
+
+// What a simulation took.
+struct SimulationCost {
+  uint64_t pairs = 0;         // of directions
+  uint64_t paths = 0;         // with those that only told how many are needed
+  double standard_error = 0;  // root mean square over the pairs, of log(1 + f c), c the larger cosine
+};
+
+// A table without a file: each value is the mean of random paths, the same ones for the same pair.
+class SimulatedTable : public Table {
+ public:
+  // Of all calls of EvaluateToLearn so far.
+  virtual SimulationCost Spent() const = 0;
+
+  // The same f with more noise, where many pairs are summed: in an image.
+  virtual void EvaluateDraft(const Direction& wi, const Direction& wo, float rgb[3]) const = 0;
 };
 
 struct Source {
-  std::string format;  // "merl", "rgl", "utia", "sparse"
+  std::string format;  // "merl", "rgl", "utia", "sparse", "layered"
   bool isotropic = true;
   float max_theta_rad = 1.5707964f;    // largest colatitude with data
   std::shared_ptr<const Table> table;  // null for a sparse list
   std::vector<Sample> samples;         // of a sparse list; else empty
-  uint64_t cells = 0;                  // colours in the file
+  std::shared_ptr<const SimulatedTable> simulated;      // the table, where it is simulated; else null
+  std::vector<std::string> effects, left_out_effects;  // of the simulation
+  uint64_t cells = 0;                  // colours in the file; 0 where there is none
   // Of those, the ones that were left out: negative, not finite. Cells of a MERL table that stand
   // for directions below the horizon are no data and not counted.
   uint64_t invalid_cells = 0;

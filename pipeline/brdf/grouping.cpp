@@ -70,13 +70,13 @@ void GroupKind(std::span<const Source* const> sources, std::vector<size_t> left,
 
 std::vector<std::vector<size_t>> GroupAlike(std::span<const Source* const> sources, size_t most) {
   std::vector<std::vector<size_t>> groups;
-  std::vector<size_t> kinds[2];
+  std::vector<size_t> kinds[4];
   for (size_t i = 0; i < sources.size(); ++i) {
     const SourceKind kind = KindOf(*sources[i]);
     if (kind.list) {
       groups.push_back({i});
     } else {
-      kinds[kind.isotropic ? 0 : 1].push_back(i);
+      kinds[(kind.isotropic ? 0 : 1) + (kind.simulated ? 2 : 0)].push_back(i);
     }
   }
   for (std::vector<size_t>& kind : kinds)

@@ -1,6 +1,7 @@
 #include "pipeline/brdf/sample_pool.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -11,7 +12,8 @@ namespace patina::brdf {
 namespace {
 
 constexpr int kTries = 64;
-constexpr int kSamplesPerTask = 4096;
+// Few enough for simulated sources to tell of progress and to stop when told.
+constexpr int kSamplesPerTask = 512;
 
 void FillValue(const float rgb[3], float weight, const Direction& wi, const Direction& wo,
                PoolSample* sample) {
@@ -67,7 +69,9 @@ AlignedBuffer<PoolSample> DrawPool(const Source& source, const GridShape& shape,
   AlignedBuffer<PoolSample> samples(options.count);
   std::vector<uint8_t> valid(options.count);
   const int tasks = static_cast<int>((options.count + kSamplesPerTask - 1) / kSamplesPerTask);
-  pool.ParallelFor(tasks, [&](int task, int) {
+  std::atomic<size_t> drawn{0};
+  pool.ParallelFor(tasks, [&](int task, int worker) {
+    if (options.cancel != nullptr && options.cancel->cancelled()) return;
     const size_t begin = static_cast<size_t>(task) * kSamplesPerTask,
                  end = std::min(options.count, begin + kSamplesPerTask);
     for (size_t i = begin; i < end; ++i) {
@@ -84,14 +88,19 @@ AlignedBuffer<PoolSample> DrawPool(const Source& source, const GridShape& shape,
                             ? Draw::kHalfAngles
                             : Draw::kDirections;
       Direction wi, wo;
-      float rgb[3];
+      float rgb[3], weight = 1;
       for (int attempt = 0; attempt < kTries && valid[i] == 0; ++attempt) {
         DrawPair(draw, &rng, &wi, &wo);
-        valid[i] = source.table->Evaluate(wi, wo, rgb) ? 1 : 0;
+        valid[i] = source.table->EvaluateToLearn(wi, wo, rgb, &weight) ? 1 : 0;
       }
       if (valid[i] == 0) continue;
       LookUpPair(shape, wi, wo, &samples[i]);
-      FillValue(rgb, 1, wi, wo, &samples[i]);
+      FillValue(rgb, weight, wi, wo, &samples[i]);
+    }
+    drawn.fetch_add(end - begin, std::memory_order_relaxed);
+    if (worker == 0 && options.on_progress) {
+      options.on_progress(static_cast<double>(drawn.load(std::memory_order_relaxed)) /
+                          static_cast<double>(options.count));
     }
   });
   if (std::find(valid.begin(), valid.end(), 0) == valid.end()) return samples;

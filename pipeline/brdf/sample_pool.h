@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "formats/brdf/brdf_source.h"
 #include "formats/healpix_corners.h"
 #include "pipeline/base/aligned_buffer.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/base/rng.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/brdf/brdf_kernels.h"
@@ -40,6 +42,8 @@ struct PoolOptions {
   size_t count = size_t{1} << 20;
   double half_angle_share = 0.5;
   uint64_t seed = 1;
+  std::function<void(double fraction)> on_progress;  // on the calling thread; may be empty
+  const CancelToken* cancel = nullptr;               // once set, what is missing is left out
 };
 
 // Samples in random order. Of a table: pairs that have valid data. Of a sparse list: its samples,

@@ -69,6 +69,7 @@ class Session {
   }
 
   Result<std::vector<TrainedBrdf>> Run() {
+    if (Cancelled()) return Fail(ErrorCode::kCancelled, "training was interrupted");
     if (samples_.size() < 64)
       return Fail(ErrorCode::kCorruptData, "too few directions have valid data to train on");
     held_out_ = std::min(kHeldOut, samples_.size() / 8);
@@ -127,6 +128,11 @@ class Session {
         std::min(options_.pool, 4 * options_.pool / static_cast<size_t>(materials_)) +
         kHeldOut / static_cast<size_t>(materials_);
     pool_options.half_angle_share = options_.half_angle_share;
+    pool_options.cancel = options_.cancel;
+    // Tables are read in no time.
+    if (KindOf(*sources[0]).simulated) {
+      pool_options.on_progress = [this](double fraction) { ReportSimulation(fraction); };
+    }
     std::vector<AlignedBuffer<PoolSample>> pools;
     size_t each = pool_options.count;
     for (int m = 0; m < materials_; ++m) {
@@ -242,6 +248,17 @@ class Session {
     }
     return std::make_unique<SoftIndex>(std::move(supervised), Codes(), layout_.feature_stride,
                                        kernels_, pool_);
+  }
+
+  void ReportSimulation(double fraction) {
+    if (SecondsSince(last_report_) < 0.2) return;
+    last_report_ = Clock::now();
+    ProgressEvent event;
+    event.stage = "train";
+    event.fraction = 0;
+    event.elapsed_s = SecondsSince(start_);
+    event.message = "simulating, " + std::to_string(static_cast<int>(100 * fraction)) + " %";
+    progress_.OnProgress(event);
   }
 
   void Report(int step, int total) {
@@ -398,7 +415,9 @@ class Session {
 
 }  // namespace
 
-SourceKind KindOf(const Source& source) { return {source.isotropic, source.table == nullptr}; }
+SourceKind KindOf(const Source& source) {
+  return {source.isotropic, source.table == nullptr, source.simulated != nullptr};
+}
 
 ModelShape DefaultShape(const SourceKind& kind) {
   ModelShape shape;

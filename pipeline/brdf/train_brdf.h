@@ -33,7 +33,8 @@ struct ModelShape {
 // What of a source decides the shape of its model.
 struct SourceKind {
   bool isotropic = true;
-  bool list = false;  // some hundred measurements instead of a table
+  bool list = false;       // some hundred measurements instead of a table
+  bool simulated = false;  // a table whose values cost time and have noise
 };
 SourceKind KindOf(const Source& source);
 

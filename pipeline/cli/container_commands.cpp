@@ -11,6 +11,7 @@
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
 #include "pipeline/jobs/sample_brdf.h"
+#include "pipeline/jobs/sample_layered.h"
 #include "pipeline/jobs/sample_scene.h"
 #include "pipeline/jobs/sample_set.h"
 #include "pipeline/jobs/unpack.h"
@@ -133,6 +134,11 @@ int SampleCommand(const CommandLine& line) {
     const Status written = WriteSampleBrdfs(folder, brdfs);
     if (!written) return FailCommand(written.error());
     for (const std::string& name : brdfs.files) paths.push_back(folder + "/" + name);
+  }
+  if (options.kind == "layered") {
+    auto written = WriteSampleLayers(options.out);
+    if (!written) return FailCommand(written.error());
+    paths = std::move(*written);
   }
   if (line.verbosity != Verbosity::kQuiet) {
     for (const std::string& path : paths) std::printf("%s\n", path.c_str());

@@ -41,8 +41,8 @@ constexpr const char* kExamples =
 constexpr const char* kBakeFooter =
     "INPUT is a folder of maps (found by their file names), a measured BRDF (MERL .binary, RGL "
     ".bsdf, UTIA .bin, a\n"
-    "list of measurements as .csv or .json), a folder of both or of such folders, or a job file "
-    "(see\n"
+    "list of measurements as .csv or .json), a layered material to simulate (*.layers.json, see\n"
+    "schemas/layered.schema.json), a folder of all these or of such folders, or a job file (see\n"
     "schemas/job.schema.json), whose fields the options replace. One asset that fails does not "
     "stop the others; the exit\n"
     "code is that of the worst. The result is OUT/<asset>/<revision>/ with OUT/<asset>/current "
@@ -53,6 +53,7 @@ constexpr const char* kBakeFooter =
     "  patina bake sample --out baked\n"
     "  patina bake library --out baked --quality preview --json\n"
     "  patina bake merl/*.binary brushed.bsdf --out baked\n"
+    "  patina bake layered/car_paint.layers.json --out baked --quality reference\n"
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
     "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches it\n"
     "  patina bake wall --out baked --size-budget 400k --time-budget 60\n"
@@ -382,10 +383,10 @@ void AddSample(CLI::App* app, CommandLine* line) {
   command
       ->add_option(
           "--kind", o.kind,
-          "material: maps and a job.json; brdf: BRDF files of every format, 200 MB; scene: a "
-          "glTF scene and a scene file; all "
+          "material: maps and a job.json; brdf: BRDF files of every format, 200 MB; layered: "
+          "materials of layers to simulate; scene: a glTF scene and a scene file; all "
           "(default): the material, and two small BRDF files in DIR/brdf")
-      ->check(CLI::IsMember({"all", "material", "brdf", "scene"}));
+      ->check(CLI::IsMember({"all", "material", "brdf", "layered", "scene"}));
   command->add_option("--size", o.size, "Texels a side of the maps (default 1024)")
       ->check(CLI::Range(1, kMaxSampleSide))
       ->type_name("N");
@@ -404,6 +405,8 @@ void AddSample(CLI::App* app, CommandLine* line) {
       "  patina run sample/job.json\n"
       "  patina sample --kind brdf --out brdfs\n"
       "  patina bake brdfs --out baked\n"
+      "  patina sample --kind layered --out layered\n"
+      "  patina bake layered/car_paint.layers.json --out baked\n"
       "  patina sample --kind scene --out scene\n"
       "  patina bake scene/mosaic.gltf --out baked");
   command->callback([line] { line->command = Command::kSample; });

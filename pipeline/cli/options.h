@@ -94,7 +94,7 @@ struct EvalOptions {
 
 struct SampleOptions {
   std::string out;
-  std::string kind = "all";  // "all", "material", "brdf", "scene"
+  std::string kind = "all";  // "all", "material", "brdf", "layered", "scene"
   int size = 1024;
   uint64_t seed = 1;
 };

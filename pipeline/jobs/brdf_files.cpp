@@ -10,6 +10,7 @@
 #include "formats/brdf/merl.h"
 #include "formats/brdf/sparse.h"
 #include "formats/brdf/utia.h"
+#include "formats/layered/layered_file.h"
 #include "pipeline/jobs/job.h"
 
 namespace patina {
@@ -86,6 +87,7 @@ bool IsMeasurementList(const std::string& path) {
 }
 
 bool LooksLikeBrdfFile(const std::string& path) {
+  if (layered::IsLayersFileName(path)) return true;
   const std::string extension = Extension(path);
   if (extension == ".bin") return IsBin(path);
   if (extension == ".csv") return IsCsv(path);
@@ -94,7 +96,9 @@ bool LooksLikeBrdfFile(const std::string& path) {
 }
 
 std::string BrdfAssetName(const std::string& path) {
-  return AssetNameFromPath(fs::path(path).stem().string());
+  const fs::path stem = fs::path(path).stem();
+  // Without both parts of ".layers.json".
+  return AssetNameFromPath((layered::IsLayersFileName(path) ? stem.stem() : stem).string());
 }
 
 Result<std::vector<std::string>> FindBrdfFiles(const std::string& folder) {

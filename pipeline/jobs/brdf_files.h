@@ -1,4 +1,4 @@
-// Which files hold measured BRDFs.
+// Which files hold BRDFs: measured ones, and layered materials to simulate.
 #pragma once
 
 #include <string>

@@ -44,6 +44,20 @@ brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind) {
   return shape;
 }
 
+layered::Effort EffortOfJob(const Job& job) {
+  layered::Effort effort;
+  effort.seed = job.seed;
+  effort.accuracy = {0.02, 16, 32, 1024};
+  if (job.quality == Quality::kPreview) {
+    effort.accuracy = {0.04, 16, 16, 256};
+    effort.draft_paths = 8;
+  } else if (job.quality == Quality::kReference) {
+    effort.accuracy = {0.01, 32, 64, 4096};
+    effort.draft_paths = 128;
+  }
+  return effort;
+}
+
 brdf::TrainOptions TrainingOfJob(const Job& job, const brdf::SourceKind& kind) {
   brdf::TrainOptions options =
       job.recipe == Recipe::kPaper ? brdf::PaperTraining() : brdf::DefaultTraining(kind);
@@ -57,10 +71,14 @@ brdf::TrainOptions TrainingOfJob(const Job& job, const brdf::SourceKind& kind) {
     case Quality::kPreview:
       options.free_steps /= 2;
       options.codebook_steps /= 4;
+      if (kind.simulated) options.pool = size_t{1} << 15;
       break;
     case Quality::kStandard:
+      // Few pairs with little noise each would be learned by heart, many with much be biased.
+      if (kind.simulated) options.pool = size_t{1} << 17;
       break;
     case Quality::kReference:
+      if (kind.simulated) options.pool = size_t{1} << 19;
       options.free_steps *= 3;
       options.codebook_steps *= 3;
       break;

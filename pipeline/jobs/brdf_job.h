@@ -5,6 +5,7 @@
 
 #include "pipeline/brdf/train_brdf.h"
 #include "pipeline/jobs/job.h"
+#include "pipeline/layered/simulated_source.h"
 
 namespace patina {
 
@@ -23,6 +24,9 @@ const char* InterpolationName(Interpolation interpolation);  // as in job files 
 
 // The model's shape: the recipe's, with what the job says in its place.
 brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind);
+
+// How exactly a layered material is simulated, by quality.
+layered::Effort EffortOfJob(const Job& job);
 
 // Steps by quality: fewer for preview, three times those of standard for reference.
 brdf::TrainOptions TrainingOfJob(const Job& job, const brdf::SourceKind& kind);

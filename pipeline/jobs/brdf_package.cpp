@@ -8,6 +8,7 @@
 #include "formats/base/sha256.h"
 #include "formats/brdf_sampler.h"
 #include "formats/index_pack.h"
+#include "formats/layered/layered_file.h"
 #include "formats/weights.h"
 #include "pipeline/brdf/sampler_fit.h"
 #include "pipeline/jobs/brdf_job.h"
@@ -82,7 +83,11 @@ Result<BrdfSource> ReadBrdfSource(const Job& job) {
   // under a wrong name.
   PATINA_ASSIGN(const FileDigest before, Sha256OfFile(job.file));
   BrdfSource source;
-  PATINA_ASSIGN(source.data, brdf::OpenBrdf(job.file));
+  if (layered::IsLayersFileName(job.file)) {
+    PATINA_ASSIGN(source.data, layered::OpenSimulated(job.file, EffortOfJob(job)));
+  } else {
+    PATINA_ASSIGN(source.data, brdf::OpenBrdf(job.file));
+  }
   PATINA_ASSIGN(const FileDigest after, Sha256OfFile(job.file));
   if (before.sha256 != after.sha256) {
     return Fail(ErrorCode::kConflict,
@@ -162,6 +167,11 @@ Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::Mode
   manifest.warnings = source.data.warnings;
   ManifestBrdf model;
   model.source_format = source.data.format;
+  if (source.data.simulated) {
+    const brdf::SimulationCost cost = source.data.simulated->Spent();
+    model.simulation = ManifestSimulation{cost.pairs, cost.paths, cost.standard_error,
+                                          source.data.effects, source.data.left_out_effects};
+  }
   model.cells = source.data.cells;
   model.invalid_cells = source.data.invalid_cells;
   model.files.push_back({ManifestPath(FileName(job.file)), source.sha256});
@@ -216,6 +226,13 @@ std::string BrdfReportToJson(const Manifest& manifest, const std::vector<Manifes
       {"invalid_cells", described.invalid_cells},
       {"isotropic", source.data.isotropic},
       {"max_theta_deg", static_cast<double>(source.data.max_theta_rad) * 180 / std::numbers::pi}};
+  if (described.simulation) {
+    json["source"]["simulation"] = {{"pairs", described.simulation->pairs},
+                                    {"paths", described.simulation->paths},
+                                    {"standard_error", described.simulation->standard_error},
+                                    {"effects", described.simulation->effects},
+                                    {"left_out", described.simulation->left_out}};
+  }
   json["model"] = ModelJson(described);
   json["quality"] = QualityJson(measurement, source.data.table == nullptr);
   json["training"] = {

@@ -21,7 +21,7 @@ struct BrdfSource {
   std::string fingerprint;  // see BrdfFingerprint
 };
 
-// Errors: those of OpenBrdf; kConflict when the file changed while it was read.
+// Errors: those of OpenBrdf and of layered::OpenSimulated; kConflict when the file changed while it was read.
 Result<BrdfSource> ReadBrdfSource(const Job& job);
 
 // Where the codebook of a model lies if it is shared; both empty if it is not.

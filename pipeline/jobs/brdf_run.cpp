@@ -54,6 +54,16 @@ class BrdfRun : public StagedRun {
     result_.fingerprint = source_.fingerprint;
     const brdf::Source& data = source_.data;
     for (const std::string& warning : data.warnings) sink_.OnWarning(warning);
+    if (data.simulated) {
+      std::string effects;
+      for (const std::string& effect : data.effects)
+        effects += (effects.empty() ? "" : ", ") + effect;
+      observer_.OnNote("found", std::filesystem::path(job_.file).filename().string() +
+                                    ": layers to simulate" +
+                                    (data.isotropic ? ", isotropic; " : ", anisotropic; ") +
+                                    (effects.empty() ? "no more than a surface" : effects));
+      return OpenStaging();
+    }
     observer_.OnNote("found",
                      std::filesystem::path(job_.file).filename().string() + ": " + data.format +
                          (data.isotropic ? ", isotropic, " : ", anisotropic, ") +
@@ -79,6 +89,13 @@ class BrdfRun : public StagedRun {
       return Fail(trained.error(), job_.file);
     }
     model_ = std::move(*trained);
+    if (source_.data.simulated) {
+      const brdf::SimulationCost cost = source_.data.simulated->Spent();
+      observer_.OnNote("simulated",
+                       Format("%.1f M paths for %.0f k pairs of directions, standard error %.4f",
+                              1e-6 * static_cast<double>(cost.paths),
+                              1e-3 * static_cast<double>(cost.pairs), cost.standard_error));
+    }
     return Trained();
   }
 

@@ -88,6 +88,12 @@ std::string Measure(const char* name, const std::optional<double>& value) {
   return value ? Format("  %-24s%.6f\n", name, *value) : "";
 }
 
+std::string Joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
 std::string BrdfText(const Manifest& m) {
   const ManifestBrdf& brdf = *m.brdf;
   std::string text =
@@ -126,9 +132,18 @@ std::string BrdfText(const Manifest& m) {
                  static_cast<unsigned long long>(ModelBytes(m.payloads)));
   text += "\nSource\n";
   for (const ManifestBrdfFile& file : brdf.files) text += "  " + file.path + "\n";
-  text += Format("  %llu colours, %llu of them not valid\n",
-                 static_cast<unsigned long long>(brdf.cells),
-                 static_cast<unsigned long long>(brdf.invalid_cells));
+  if (brdf.simulation) {
+    text += Format("  simulated: %llu pairs of directions, %llu paths, standard error %.4f\n",
+                   static_cast<unsigned long long>(brdf.simulation->pairs),
+                   static_cast<unsigned long long>(brdf.simulation->paths),
+                   brdf.simulation->standard_error);
+    text += "  effects: " + Joined(brdf.simulation->effects) +
+            "; left out: " + Joined(brdf.simulation->left_out) + "\n";
+  } else {
+    text += Format("  %llu colours, %llu of them not valid\n",
+                   static_cast<unsigned long long>(brdf.cells),
+                   static_cast<unsigned long long>(brdf.invalid_cells));
+  }
   for (const std::string& warning : m.warnings) text += "Warning: " + warning + "\n";
   return text;
 }
@@ -159,7 +174,8 @@ std::string ContainerText(const Container& container) {
   if (m.color_config) {
     text += ", configuration " +
             (m.color_config->file.empty() ? "built in" : m.color_config->file) + " (" +
-            (m.color_config->source == "environment" ? "of $OCIO, " : "") + "sha256 " + m.color_config->sha256.substr(0, 12) + "...)";
+            (m.color_config->source == "environment" ? "of $OCIO, " : "") + "sha256 " +
+            m.color_config->sha256.substr(0, 12) + "...)";
   }
   text += "\n";
   for (const ManifestMap& map : m.maps) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "formats/brdf/brdf_source.h"
+#include "formats/layered/layered_file.h"
 #include "pipeline/image/map_name.h"
 #include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/job_sets.h"
@@ -22,6 +23,7 @@ PlannedJob PlanBrdf(const std::string& asset, const std::string& file) {
 
 // A file is a BRDF by its extension; a .json by its content, as job files end so, too.
 bool IsBrdf(const std::string& path) {
+  if (layered::IsLayersFileName(path)) return true;
   return LowerExtension(path) == ".json" ? IsMeasurementList(path) : brdf::HasBrdfExtension(path);
 }
 

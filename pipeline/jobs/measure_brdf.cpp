@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numbers>
 #include <vector>
@@ -21,6 +22,7 @@ using brdf::Direction;
 
 constexpr double kPi = std::numbers::pi;
 constexpr int kImageSide = 128;
+constexpr int kDraftSide = 64;  // of simulated sources, enlarged for the sheet
 constexpr int kLightColumns = 32;
 constexpr int kLightRows = 16;
 constexpr float kExposure = 2;
@@ -76,6 +78,22 @@ brdf::EvaluatePairs TableFunction(const brdf::Table& table) {
       table.Evaluate(wi[i], wo[i], rgb + 3 * i);
       for (size_t c = 0; c < 3; ++c) rgb[3 * i + c] = std::max(rgb[3 * i + c], 0.0f);
     }
+  };
+}
+
+// The same of a simulated table, which takes a while: tells how far it is, and stops when told.
+brdf::EvaluatePairs DraftFunction(const brdf::SimulatedTable& table, const CancelToken& cancel,
+                                  std::function<void(size_t)> on_pairs) {
+  return [&table, &cancel, on_pairs](int worker, size_t count, const Direction* wi,
+                                     const Direction* wo, float* rgb) {
+    for (size_t i = 0; i < count; ++i) {
+      if (cancel.cancelled()) {
+        std::fill(rgb, rgb + 3 * count, 0.0f);
+        return;
+      }
+      table.EvaluateDraft(wi[i], wo[i], rgb + 3 * i);
+    }
+    if (worker == 0) on_pairs(count);
   };
 }
 
@@ -162,10 +180,29 @@ RgbImage DifferenceOf(const RgbImage& a, const RgbImage& b) {
   return difference;
 }
 
+brdf::SphereImage Enlarged(const brdf::SphereImage& image, int factor) {
+  brdf::SphereImage large;
+  large.side = image.side * factor;
+  for (int y = 0; y < large.side; ++y) {
+    for (int x = 0; x < large.side; ++x) {
+      const size_t from = static_cast<size_t>(y / factor) * image.side + x / factor;
+      large.inside.push_back(image.inside[from]);
+      for (size_t c = 0; c < 3; ++c) large.rgb.push_back(image.rgb[3 * from + c]);
+    }
+  }
+  return large;
+}
+
 class Meter {
  public:
-  Meter(const brdf::Source& source, const BrdfDecoder& decoder, Decoded* decoded, ThreadPool& pool)
-      : source_(source), decoder_(decoder), decoded_(*decoded), pool_(pool) {}
+  Meter(const brdf::Source& source, const BrdfDecoder& decoder, Decoded* decoded, ThreadPool& pool,
+        const CancelToken& cancel, ProgressSink& progress)
+      : source_(source),
+        decoder_(decoder),
+        decoded_(*decoded),
+        pool_(pool),
+        cancel_(cancel),
+        progress_(progress) {}
 
   // Mean difference of the decoder's and the kernels' log(1 + f) at the pairs of MeasurePairs.
   double disagreement() const { return disagreement_; }
@@ -212,6 +249,7 @@ class Meter {
     };
     result->decoded_picture = ForAPerson(render(decoded_.Function(), kSheetTile));
     if (source_.table == nullptr) return;
+    if (source_.simulated) return MeasureDraft(lights, result);
     const brdf::EvaluatePairs table = TableFunction(*source_.table);
     result->source_picture = ForAPerson(render(table, kSheetTile));
     result->difference_picture = DifferenceOf(result->source_picture, result->decoded_picture);
@@ -220,6 +258,29 @@ class Meter {
   }
 
  private:
+  void MeasureDraft(const brdf::Environment& lights, BrdfMeasurement* result) {
+    // Of the pairs above both horizons about a half is that many on average.
+    const double expected =
+        0.33 * kDraftSide * kDraftSide * static_cast<double>(lights.lights.size());
+    double done = 0;
+    const auto on_pairs = [&](size_t count) {
+      done += static_cast<double>(count) * pool_.threads();
+      ProgressEvent event;
+      event.stage = "verify";
+      event.fraction = 0.2 + 0.8 * std::min(1.0, done / expected);
+      event.message = "simulating the picture";
+      progress_.OnProgress(event);
+    };
+    const brdf::SphereImage source = brdf::RenderSphere(
+        DraftFunction(*source_.simulated, cancel_, on_pairs), lights, kDraftSide, kExposure, pool_);
+    const brdf::SphereImage decoded =
+        brdf::RenderSphere(decoded_.Function(), lights, kDraftSide, kExposure, pool_);
+    result->source_picture = ForAPerson(Enlarged(source, kSheetTile / kDraftSide));
+    result->difference_picture = DifferenceOf(
+        result->source_picture, ForAPerson(Enlarged(decoded, kSheetTile / kDraftSide)));
+    result->image = brdf::CompareSpheres(source, decoded, pool_);
+  }
+
   void Draw(brdf::Draw draw, Pairs* pairs, std::vector<float>* wanted) const {
     Rng rng(kPairSeed, draw == brdf::Draw::kHalfAngles ? 0 : 1);
     for (size_t n = 0; n < kPairsOfEach; ++n) {
@@ -236,6 +297,8 @@ class Meter {
   const BrdfDecoder& decoder_;
   Decoded& decoded_;
   ThreadPool& pool_;
+  const CancelToken& cancel_;
+  ProgressSink& progress_;
   double disagreement_ = 0;
 };
 
@@ -294,13 +357,14 @@ Result<BrdfMeasurement> MeasureBrdf(const std::string& directory, const Manifest
   PATINA_ASSIGN(const brdf::BatchEvaluator evaluator, OpenBrdfContainer(directory, model));
   Decoded decoded(evaluator, pool.threads());
   PATINA_ASSIGN(const BrdfDecoder decoder, LoadBrdfDecoder(directory));
-  Meter meter(source, decoder, &decoded, pool);
+  Meter meter(source, decoder, &decoded, pool, cancel, progress);
   BrdfMeasurement result;
   const std::pair<double, void (Meter::*)(BrdfMeasurement*)> steps[] = {
       {0.1, &Meter::MeasurePairs}, {0.2, &Meter::MeasureAlbedo}, {1.0, &Meter::MeasureImages}};
   for (const auto& [fraction, step] : steps) {
     if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
     (meter.*step)(&result);
+    if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
     if (!decoded.finite())
       return Fail(ErrorCode::kInternal, directory + ": decodes to a value that is not finite");
     // Images are rendered with the kernels, so both must see the same material. They differ by

@@ -28,7 +28,9 @@ struct Log1pError {
 };
 
 struct BrdfMeasurement {
-  std::optional<brdf::ImageError> image;  // of a lit sphere; absent for a list of measurements
+  // Of a lit sphere; absent for a list of measurements. Of a simulated source: a smaller sphere,
+  // with the noise of the simulation in its error.
+  std::optional<brdf::ImageError> image;
   // Of a table: 8192 pairs each, from a fixed seed (brdf::DrawPair). Of a list: its measurements,
   // and nothing.
   Log1pError half_angles, directions;

@@ -369,6 +369,8 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRulesOfBrdfs) {
       {"/brdf", [](Manifest* m) { m->kind = "material"; }},
       {"/kind", [](Manifest* m) { m->maps.resize(1); }},
       {"/source/format", [](Manifest* m) { m->brdf->source_format = ""; }},
+      {"/source/simulation/standard_error",
+       [](Manifest* m) { m->brdf->simulation.emplace().standard_error = -1; }},
       {"/source/invalid_cells", [](Manifest* m) { m->brdf->invalid_cells = 1458001; }},
       {"/source/files/0/path", [](Manifest* m) { m->brdf->files[0].path = "../x"; }},
       {"/source/files/0/sha256", [](Manifest* m) { m->brdf->files[0].sha256 = "5"; }},
@@ -422,6 +424,16 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRulesOfBrdfs) {
   json document = json::parse(*ToJson(FullBrdfManifest()));
   document["brdf"]["interpolation"] = "cubic";
   EXPECT_EQ(ParseManifest(document.dump()).error().code, ErrorCode::kUnsupported);
+}
+
+TEST(ManifestBrdf, KeepsHowItsSourceWasSimulated) {
+  const auto text = ReadTextFile(ExamplePath("manifest_brdf_layered.json"), kMaxManifestBytes);
+  ASSERT_OK(text);
+  const auto manifest = ParseManifest(*text);
+  ASSERT_OK(manifest);
+  ASSERT_TRUE(manifest->brdf->simulation.has_value());
+  EXPECT_EQ(manifest->brdf->simulation->paths, 9437184u);
+  EXPECT_EQ(json::parse(*ToJson(*manifest))["source"], json::parse(*text)["source"]);
 }
 
 // schemas/examples/manifest_invalid_*.json break the schema; the other manifest_*.json satisfy

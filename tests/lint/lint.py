@@ -20,7 +20,7 @@ PIPELINE_TIERS = {
     "base": 0,
     "kernels": 1,
     "bc6": 2, "color": 2, "effects": 2, "healpix": 2, "image": 2, "metrics": 2, "nn": 2,
-    "brdf": 3, "material": 3, "report": 3, "simulate": 3,
+    "brdf": 3, "layered": 3, "material": 3, "report": 3,
     "jobs": 4,
     "client": 5, "tradeoff": 5, "validate": 5,
     "cli": 6,

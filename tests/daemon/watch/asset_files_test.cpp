@@ -32,6 +32,7 @@ TEST(AssetFiles, NamesAssetsByTheirPath) {
   EXPECT_EQ(AssetNameBelow("drop", "", false), "drop");
   EXPECT_EQ(AssetNameBelow("drop", "stone/old wall", false), "stone_old_wall");
   EXPECT_EQ(AssetNameBelow("drop", "merl/chrome.binary", true), "merl_chrome");
+  EXPECT_EQ(AssetNameBelow("drop", "paint/car.layers.json", true), "paint_car");
   EXPECT_EQ(AssetNameBelow("drop", "v1.2/chrome", true), "v1.2_chrome");
   EXPECT_EQ(AssetNameBelow("drop", "wall.v2", false), "wall.v2");
   const std::string odd = AssetNameBelow("drop", "m\xC3\xBC", false);

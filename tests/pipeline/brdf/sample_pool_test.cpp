@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <memory>
 
 #include "pipeline/brdf/angle_inputs.h"
 #include "tests/pipeline/brdf/brdf_samples.h"
@@ -235,6 +236,45 @@ TEST(SamplePool, OfATableWithoutDataIsEmpty) {
   PoolOptions options;
   options.count = 100;
   EXPECT_EQ(DrawPool(source, GridShape{}, options, pool).size(), 0u);
+}
+
+// Values of the left half are noisy.
+class NoisyTable : public Table {
+ public:
+  bool Evaluate(const Direction&, const Direction&, float rgb[3]) const override {
+    rgb[0] = rgb[1] = rgb[2] = 1;
+    return true;
+  }
+  bool EvaluateToLearn(const Direction& wi, const Direction& wo, float rgb[3],
+                       float* weight) const override {
+    *weight = wi.x + wo.x < 0 ? 0.25f : 1;
+    return Evaluate(wi, wo, rgb);
+  }
+};
+
+TEST(SamplePool, TakesTheWeightOfEachValueAndTellsHowFarItIs) {
+  Source source;
+  source.table = std::make_shared<NoisyTable>();
+  ThreadPool pool(1);
+  PoolOptions options;
+  options.count = 4096;
+  double last = 0;
+  options.on_progress = [&](double fraction) {
+    EXPECT_GT(fraction, last);
+    last = fraction;
+  };
+  const auto samples = DrawPool(source, {}, options, pool);
+  EXPECT_EQ(last, 1);
+  int noisy = 0;
+  for (size_t s = 0; s < samples.size(); ++s) {
+    EXPECT_TRUE(samples[s].importance == 1 || samples[s].importance == 0.25f);
+    noisy += samples[s].importance < 1 ? 1 : 0;
+  }
+  EXPECT_NEAR(noisy, 2048, 6 * 32);  // six standard deviations
+  CancelToken cancel;
+  cancel.Cancel();
+  options.cancel = &cancel;
+  EXPECT_EQ(DrawPool(source, {}, options, pool).size(), 0u);
 }
 
 }  // namespace

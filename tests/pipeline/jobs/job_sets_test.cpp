@@ -211,5 +211,14 @@ TEST_F(JobSets, AListOfMeasurementsIsToldFromAJob) {
   EXPECT_FALSE(IsMeasurementList(folder_ + "/nowhere.json"));
 }
 
+TEST_F(JobSets, LayeredMaterialsAreKnownByTheirName) {
+  Text("wood.layers.json", "{");
+  EXPECT_TRUE(LooksLikeBrdfFile(folder_ + "/wood.layers.json"));
+  EXPECT_EQ(BrdfAssetName(folder_ + "/wood.layers.json"), "wood");
+  const auto files = FindBrdfFiles(folder_);
+  ASSERT_TRUE(files.has_value());
+  EXPECT_EQ(*files, std::vector<std::string>{folder_ + "/wood.layers.json"});
+}
+
 }  // namespace
 }  // namespace patina

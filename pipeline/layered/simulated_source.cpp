@@ -1,0 +1,149 @@
+#include "pipeline/layered/simulated_source.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+
+#include "formats/layered/layered_file.h"
+
+namespace patina::layered {
+namespace {
+
+constexpr double kTrustedError = 0.05;
+constexpr double kUsualEvents = 8;
+// Walks that tell how long paths are and what leaves a stack.
+constexpr int kTrialAngles = 8;
+constexpr int kTrialWalks = 64;
+// Squared errors are summed as integers: their order, which threads decide, must not count.
+constexpr double kErrorUnit = 1e-9;
+
+struct Trial {
+  double events = 0;                   // of a walk, mean
+  double mirrored = 0, scattered = 0;  // shares of light that leave, over all angles
+};
+
+Trial TryOut(const Simulator& simulator) {
+  Trial trial;
+  Rng rng(1);
+  for (int angle = 0; angle < kTrialAngles; ++angle) {
+    const double z = (angle + 0.5) / kTrialAngles;
+    const brdf::Direction w{static_cast<float>(std::sqrt(1 - z * z)), 0, static_cast<float>(z)};
+    for (int walk = 0; walk < kTrialWalks; ++walk) {
+      const Exit exit = simulator.Walk(w, &rng);
+      trial.events += exit.events;
+      const double share = std::max({exit.weight[0], exit.weight[1], exit.weight[2]});
+      (exit.smooth ? trial.mirrored : trial.scattered) += share;
+    }
+  }
+  constexpr double kCount = kTrialAngles * kTrialWalks;
+  return {trial.events / kCount, trial.mirrored / kCount, trial.scattered / kCount};
+}
+
+class StackTable : public brdf::SimulatedTable {
+ public:
+  StackTable(const Simulator& simulator, const Effort& effort, double events)
+      : simulator_(simulator), accuracy_(effort.accuracy), seed_(effort.seed) {
+    const double scale = std::clamp(kUsualEvents / std::max(events, 1.0), 1.0 / 16, 1.0);
+    const auto scaled = [scale](int paths, int least) {
+      return std::max(least, static_cast<int>(scale * paths));
+    };
+    accuracy_.pilot_paths = scaled(accuracy_.pilot_paths, 8);
+    accuracy_.min_paths = scaled(accuracy_.min_paths, 8);
+    accuracy_.max_paths = std::max(accuracy_.min_paths, scaled(accuracy_.max_paths, 8));
+    draft_paths_ = scaled(effort.draft_paths, 2);
+  }
+
+  bool Evaluate(const brdf::Direction& wi, const brdf::Direction& wo, float rgb[3]) const override {
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    if (!(wi.z > 0 && wo.z > 0)) return false;
+    Store(simulator_.Evaluate(wi, wo, accuracy_, seed_), rgb);
+    return true;
+  }
+
+  bool EvaluateToLearn(const brdf::Direction& wi, const brdf::Direction& wo, float rgb[3],
+                       float* weight) const override {
+    *weight = 1;
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    if (!(wi.z > 0 && wo.z > 0)) return false;
+    const Estimate estimate = simulator_.Evaluate(wi, wo, accuracy_, seed_);
+    Store(estimate, rgb);
+    const double error = Simulator::StandardError(estimate, wi, wo);
+    const double relative = error / kTrustedError;
+    *weight = static_cast<float>(1 / (1 + relative * relative));
+    pairs_.fetch_add(1, std::memory_order_relaxed);
+    paths_.fetch_add(static_cast<uint64_t>(estimate.spent), std::memory_order_relaxed);
+    // More than any error of a logarithm that is still of use.
+    const double square = std::min(error * error, 1.0);
+    squares_.fetch_add(static_cast<uint64_t>(square / kErrorUnit), std::memory_order_relaxed);
+    return true;
+  }
+
+  void EvaluateDraft(const brdf::Direction& wi, const brdf::Direction& wo,
+                     float rgb[3]) const override {
+    rgb[0] = rgb[1] = rgb[2] = 0;
+    if (!(wi.z > 0 && wo.z > 0)) return;
+    Store(simulator_.Average(wi, wo, draft_paths_, seed_), rgb);
+  }
+
+  brdf::SimulationCost Spent() const override {
+    brdf::SimulationCost cost;
+    cost.pairs = pairs_.load();
+    cost.paths = paths_.load();
+    if (cost.pairs > 0) {
+      cost.standard_error = std::sqrt(static_cast<double>(squares_.load()) * kErrorUnit /
+                                      static_cast<double>(cost.pairs));
+    }
+    return cost;
+  }
+
+ private:
+  static void Store(const Estimate& estimate, float rgb[3]) {
+    for (size_t c = 0; c < 3; ++c) rgb[c] = static_cast<float>(std::min(estimate.f[c], 1e30));
+  }
+
+  Simulator simulator_;
+  Accuracy accuracy_;
+  uint64_t seed_;
+  int draft_paths_ = 2;
+  mutable std::atomic<uint64_t> pairs_{0}, paths_{0}, squares_{0};
+};
+
+}  // namespace
+
+Result<brdf::Source> SimulatedSource(const Stack& stack, const Effort& effort) {
+  const Simulator simulator(stack);
+  const Trial trial = TryOut(simulator);
+  if (!(trial.scattered > 0)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "the material only mirrors, or reflects nothing at all: there is no BRDF to learn; "
+                "give a surface a roughness of 0.005 or more, or a layer or the base something "
+                "that scatters");
+  }
+  brdf::Source source;
+  source.format = "layered";
+  source.isotropic = simulator.isotropic();
+  source.simulated = std::make_shared<StackTable>(simulator, effort, trial.events);
+  source.table = source.simulated;
+  source.effects = EffectNames(simulator.effects());
+  source.left_out_effects = LeftOutNames(simulator.effects());
+  if (trial.mirrored > 1e-4) {
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "smooth surfaces mirror %.1f %% of the light, which no BRDF can hold and which is "
+        "left out; give them a roughness of 0.005 or more to have it",
+        100 * trial.mirrored);
+    source.warnings.push_back(text);
+  }
+  return source;
+}
+
+Result<brdf::Source> OpenSimulated(const std::string& path, const Effort& effort) {
+  PATINA_ASSIGN(const Stack stack, ReadStack(path));
+  auto source = SimulatedSource(stack, effort);
+  if (!source) return Fail(source.error(), path);
+  return source;
+}
+
+}  // namespace patina::layered

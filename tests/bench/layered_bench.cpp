@@ -1,0 +1,339 @@
+// What each effect of a layered material costs, and what an absent one does: nothing.
+//
+//   patina_layered_bench [--paths N]
+//
+// Times are processor time of one thread; programs that are compared take turns in one process.
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "pipeline/layered/presets.h"
+#include "pipeline/layered/simulator.h"
+
+namespace patina::layered {
+namespace {
+
+constexpr int kRounds = 9;
+
+double CpuSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+// Median processor seconds of each program, which take turns.
+std::vector<double> Alternate(const std::vector<std::function<void()>>& programs) {
+  std::vector<std::vector<double>> times(programs.size());
+  for (int round = 0; round < kRounds; ++round) {
+    for (size_t p = 0; p < programs.size(); ++p) {
+      const double start = CpuSeconds();
+      programs[p]();
+      times[p].push_back(CpuSeconds() - start);
+    }
+  }
+  std::vector<double> medians;
+  for (const std::vector<double>& all : times) medians.push_back(Median(all));
+  return medians;
+}
+
+const Vec kWi = Normalized({0.6, 0, 0.8});
+const Vec kWo = Normalized({-0.36, 0.48, 0.8});
+
+double Uniform(Rng* rng) { return static_cast<double>(rng->Next() >> 11) * 0x1p-53; }
+
+// A rough dielectric over a grey diffuse base, and nothing else: written by hand for this one
+// material, the same walk with the same random numbers as the simulator's kernel.
+struct ByHand {
+  Ggx ggx;
+  double eta, albedo;
+
+  Vec Facet(const Vec& w, double index, Rng* rng, double* cosine, double* cos_t,
+            double* fresnel) const {
+    const double u0 = Uniform(rng), u1 = Uniform(rng);
+    const Vec m = ggx.SampleVisible(w, u0, u1);
+    *cosine = std::clamp(Dot(w, m), 0.0, 1.0);
+    *fresnel = FresnelDielectric(*cosine, index, cos_t);
+    return m;
+  }
+
+  double Path(const Vec& wi, const Vec& wo, double mirrored, Rng* rng) const {
+    double total = mirrored, cosine, cos_t, fresnel;
+    // The way out.
+    bool has_way_out = false;
+    Vec out;
+    double gain = 0, inverse_pdf = 0;
+    Vec m = Facet(wo, eta, rng, &cosine, &cos_t, &fresnel);
+    Vec t = (-1 / eta) * wo + (cosine / eta - cos_t) * m;
+    if (cos_t > 0 && cosine > 0 && t.z < 0) {
+      const FacetCrossing crossing = CrossingAt(ggx, wo, t, m, cosine, cos_t, fresnel, eta);
+      if (crossing.pdf > 0) {
+        has_way_out = true;
+        out = -t;
+        inverse_pdf = 1 / crossing.pdf;
+        gain = 1 / wo.z * (crossing.value / crossing.pdf * wo.z / (eta * eta * out.z));
+      }
+    }
+    // The way in.
+    m = Facet(wi, eta, rng, &cosine, &cos_t, &fresnel);
+    t = (-1 / eta) * wi + (cosine / eta - cos_t) * m;
+    if (!(cos_t > 0 && cosine > 0 && t.z < 0)) return total;
+    double light = (1 - fresnel) * ggx.Masking(t);
+    for (int events = 1;;) {
+      if (!(light > 0)) return total;
+      if (events >= 4 && light < 0.25) {
+        if (!(Uniform(rng) < light / 0.25)) return total;
+        light = 0.25;
+      }
+      ++events;
+      if (has_way_out) {
+        const double lobe = out.z / kPi;
+        total += light * (albedo * lobe) * gain / (1 + lobe * inverse_pdf);
+      }
+      const double u = Uniform(rng);
+      double sine, cosine_phi;
+      SinCosTurns(Uniform(rng), &sine, &cosine_phi);
+      const double r = std::sqrt(u);
+      const Vec w{-r * cosine_phi, -r * sine, std::sqrt(1 - u)};  // as if from above
+      light *= albedo;
+      // The surface from below.
+      if (!(light > 0)) return total;
+      if (events >= 4 && light < 0.25) {
+        if (!(Uniform(rng) < light / 0.25)) return total;
+        light = 0.25;
+      }
+      ++events;
+      const double links = 1 / (w.z / kPi);
+      const FacetCrossing crossing = EvaluateCrossing(ggx, w, {wo.x, wo.y, -wo.z}, 1 / eta);
+      if (crossing.value > 0)
+        total += light * (crossing.value / wo.z / (1 + links * crossing.reverse_pdf));
+      m = Facet(w, 1 / eta, rng, &cosine, &cos_t, &fresnel);
+      if (!(Uniform(rng) < fresnel)) return total;
+      const Vec reflected = 2 * cosine * m + -w;
+      if (!(reflected.z > 0)) return total;
+      const double lambda = ggx.Lambda(w);
+      light *= (1 + lambda) / (1 + lambda + ggx.Lambda(reflected));
+    }
+  }
+
+  void Run(int paths, Rng* rng, double* sum, double* squares) const {
+    const FacetReflection top = EvaluateReflection(ggx, kWi, kWo);
+    double cos_t;
+    const double mirrored = top.value / kWo.z * FresnelDielectric(top.cosine, eta, &cos_t);
+    for (int path = 0; path < paths; ++path) {
+      const double f = Path(kWi, kWo, mirrored, rng);
+      for (int c = 0; c < 3; ++c) {
+        sum[c] += f;
+        squares[c] += f * f;
+      }
+    }
+  }
+};
+
+Layer Coat(double alpha) {
+  Layer layer;
+  layer.roughness = {alpha, alpha, 0};
+  return layer;
+}
+BasePart Grey() {
+  BasePart part;
+  part.albedo = {0.5, 0.5, 0.5};
+  return part;
+}
+
+// The sums of a run; printed, so that none of it can be left out.
+struct Sums {
+  double sum[3] = {0, 0, 0}, squares[3] = {0, 0, 0};
+};
+
+int CompareByHand(int paths) {
+  Stack stack;
+  stack.layers = {Coat(0.15)};
+  stack.parts = {Grey()};
+  const PreparedStack prepared = Prepare(stack);
+  const EstimateKernel kernel = KernelFor(prepared.effects);
+  const Effects all{true, true, true, true, true, true};
+  const EstimateKernel everything = KernelFor(all);
+  const ByHand by_hand{prepared.interfaces[0].surface.ggx, prepared.interfaces[0].eta, 0.5};
+  Sums own, hand, full;
+  const auto reset = [](Sums* sums) { *sums = Sums(); };
+  const std::vector<double> times = Alternate({
+      [&] {
+        reset(&own);
+        Rng rng(1);
+        kernel(prepared, kWi, kWo, paths, &rng, own.sum, own.squares);
+      },
+      [&] {
+        reset(&hand);
+        Rng rng(1);
+        by_hand.Run(paths, &rng, hand.sum, hand.squares);
+      },
+      [&] {
+        reset(&full);
+        Rng rng(1);
+        everything(prepared, kWi, kWo, paths, &rng, full.sum, full.squares);
+      },
+  });
+  std::printf("\nRough dielectric over grey diffuse, %d paths, medians of %d turns:\n", paths,
+              kRounds);
+  std::printf("  kernel of these effects   %7.1f ns a path, f %.5f\n", 1e9 * times[0] / paths,
+              own.sum[0] / paths);
+  std::printf("  written by hand           %7.1f ns a path, f %.5f\n", 1e9 * times[1] / paths,
+              hand.sum[0] / paths);
+  std::printf("  kernel of all effects     %7.1f ns a path, f %.5f\n", 1e9 * times[2] / paths,
+              full.sum[0] / paths);
+  std::printf("  kernel over hand-written %.3f; all effects over kernel %.2f\n",
+              times[0] / times[1], times[2] / times[0]);
+  if (std::abs(own.sum[0] - hand.sum[0]) > 1e-6 * hand.sum[0]) {
+    std::printf("  THE TWO DIFFER\n");
+    return 1;
+  }
+  return 0;
+}
+
+void PrintEffects(int paths) {
+  struct Row {
+    const char* name;
+    Stack stack;
+  };
+  std::vector<Row> rows;
+  const auto add = [&](const char* name, const std::function<void(Stack*)>& change) {
+    Stack stack;
+    stack.layers = {Coat(0.15)};
+    stack.parts = {Grey()};
+    change(&stack);
+    rows.push_back({name, stack});
+  };
+  add("smooth over diffuse", [](Stack* s) { s->layers = {Coat(0)}; });
+  add("rough over diffuse (base line)", [](Stack*) {});
+  add("+ colour", [](Stack* s) { s->parts[0].albedo = {0.6, 0.5, 0.4}; });
+  add("+ anisotropy", [](Stack* s) { s->layers[0].roughness = {0.3, 0.1, 0.5}; });
+  add("+ a conductor as the base", [](Stack* s) {
+    s->parts[0].kind = BaseKind::kConductor;
+    s->parts[0].eta = s->parts[0].k = {2, 2, 2};
+    s->parts[0].roughness = {0.2, 0.2, 0};
+  });
+  add("+ a second rough layer", [](Stack* s) {
+    s->layers.push_back(Coat(0.2));
+    s->layers[1].ior = 1.33;
+  });
+  add("+ absorption", [](Stack* s) {
+    s->layers[0].thickness = 1;
+    s->layers[0].absorption = {0.2, 0.2, 0.2};
+  });
+  add("+ scattering", [](Stack* s) {
+    s->layers[0].thickness = 1;
+    s->layers[0].scattering = {0.5, 0.5, 0.5};
+  });
+  for (const Preset& preset : Presets()) rows.push_back({preset.name.c_str(), preset.stack});
+  std::vector<std::function<void()>> programs;
+  std::vector<Sums> sums(rows.size());
+  std::vector<PreparedStack> stacks;
+  for (const Row& row : rows) stacks.push_back(Prepare(row.stack));
+  for (size_t r = 0; r < rows.size(); ++r) {
+    programs.emplace_back([&, r] {
+      sums[r] = Sums();
+      Rng rng(1);
+      KernelFor(stacks[r].effects)(stacks[r], kWi, kWo, paths, &rng, sums[r].sum, sums[r].squares);
+    });
+  }
+  const std::vector<double> times = Alternate(programs);
+  std::printf("%-34s %9s %12s %10s %10s  %s\n", "material", "ns/path", "M paths/s", "against",
+              "spread", "f (green)");
+  for (size_t r = 0; r < rows.size(); ++r) {
+    const double mean = sums[r].sum[1] / paths;
+    // Of one path, against its mean: what more paths have to fight.
+    const double spread = std::sqrt(std::max(0.0, sums[r].squares[1] / paths - mean * mean)) / mean;
+    std::printf("%-34s %9.1f %12.2f %9.2fx %10.2f  %.5f\n", rows[r].name, 1e9 * times[r] / paths,
+                1e-6 * paths / times[r], times[r] / times[1], spread, mean);
+  }
+}
+
+// The error that one pair in twenty exceeds.
+double Worst(std::vector<double> errors) {
+  std::sort(errors.begin(), errors.end());
+  return errors[errors.size() * 19 / 20];
+}
+
+// Accuracy against time: paths go to the pairs of directions that need them.
+void PrintAccuracy() {
+  constexpr int kPairs = 400;
+  std::printf(
+      "\nAccuracy against time, %d random pairs of coated_metal: standard error of "
+      "log(1 + f c) that one pair in twenty exceeds\n",
+      kPairs);
+  std::printf("%10s %14s %10s %14s %22s\n", "asked for", "paths a pair", "error", "ms, adaptive",
+              "ms, as many for each");
+  const Simulator simulator(Presets()[2].stack);
+  std::vector<brdf::Direction> wi, wo;
+  Rng rng(7);
+  for (int i = 0; i < kPairs; ++i) {
+    for (std::vector<brdf::Direction>* all : {&wi, &wo}) {
+      const double z = 0.05 + 0.95 * Uniform(&rng), s = std::sqrt(1 - z * z);
+      double sine, cosine;
+      SinCosTurns(Uniform(&rng), &sine, &cosine);
+      all->push_back(
+          {static_cast<float>(s * cosine), static_cast<float>(s * sine), static_cast<float>(z)});
+    }
+  }
+  for (const double target : {0.01, 0.005, 0.0025, 0.00125}) {
+    Accuracy accuracy;
+    accuracy.standard_error = target;
+    accuracy.max_paths = 1 << 20;
+    std::vector<double> errors, even_errors;
+    double paths = 0;
+    double start = CpuSeconds();
+    for (size_t i = 0; i < wi.size(); ++i) {
+      const Estimate estimate = simulator.Evaluate(wi[i], wo[i], accuracy, 1);
+      errors.push_back(Simulator::StandardError(estimate, wi[i], wo[i]));
+      paths += estimate.spent;
+    }
+    const double adaptive_s = CpuSeconds() - start;
+    const int each = static_cast<int>(paths / kPairs);
+    start = CpuSeconds();
+    for (size_t i = 0; i < wi.size(); ++i) {
+      const Estimate estimate = simulator.Average(wi[i], wo[i], each, 1);
+      even_errors.push_back(Simulator::StandardError(estimate, wi[i], wo[i]));
+    }
+    // Errors fall with the square root of the time.
+    const double ratio = Worst(even_errors) / Worst(errors);
+    const double even_s = (CpuSeconds() - start) * ratio * ratio;
+    std::printf("%10.5f %14.0f %10.5f %14.1f %22.1f\n", target, paths / kPairs, Worst(errors),
+                1e3 * adaptive_s, 1e3 * even_s);
+  }
+}
+
+int Main(int argc, char** argv) {
+  int paths = 100000;
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--paths") == 0 && i + 1 < argc) {
+      paths = std::atoi(argv[++i]);
+    } else {
+      paths = 0;
+    }
+  }
+  if (paths < 100) {
+    std::fprintf(stderr, "usage: patina_layered_bench [--paths N], N at least 100\n");
+    return 2;
+  }
+  PrintEffects(paths);
+  const int failed = CompareByHand(paths);
+  PrintAccuracy();
+  return failed;
+}
+
+}  // namespace
+}  // namespace patina::layered
+
+int main(int argc, char** argv) { return patina::layered::Main(argc, argv); }

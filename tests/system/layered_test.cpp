@@ -1,0 +1,74 @@
+// Layered materials through the command `patina`: from a sample to a container.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "formats/schema_check.h"
+#include "tests/system/child_process.h"
+
+namespace patina {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing_support::Outcome;
+using testing_support::Patina;
+using testing_support::ReadAll;
+using testing_support::TempFolder;
+using Json = nlohmann::json;
+
+TEST(LayeredMaterials, AreBakedLikeMeasuredOnes) {
+  TempFolder folder;
+  const Outcome made = Patina({"sample", "--kind", "layered", "--out", folder / "in"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("car_paint.layers.json"));
+  // Of the folder only the cheapest stays.
+  for (const auto& entry : fs::directory_iterator(folder / "in")) {
+    if (entry.path().filename() != "lacquered_wood.layers.json") fs::remove(entry.path());
+  }
+  const auto bake = [&](const std::string& out, const std::string& threads) {
+    const Outcome baked = Patina({"bake", folder / "in", "--out", folder / out, "--quality",
+                                  "preview", "--threads", threads, "--json"});
+    EXPECT_EQ(baked.exit_code, 0) << baked.err;
+    return folder / (out + "/lacquered_wood/current");
+  };
+  const std::string one = bake("one", "1"), two = bake("two", "2");
+  for (const char* file : {"grid.hpx", "decoder.weights", "sampler.bin", "manifest.json",
+                           "report.json", "preview.png"}) {
+    EXPECT_EQ(ReadAll(one + "/" + file), ReadAll(two + "/" + file)) << file;
+  }
+  const Json manifest = Json::parse(ReadAll(one + "/manifest.json"));
+  const Status status = CheckAgainstSchema("manifest", manifest);
+  EXPECT_TRUE(status) << status.error().message;
+  EXPECT_EQ(manifest["kind"], "brdf");
+  EXPECT_EQ(manifest["brdf"]["isotropic"], true);
+  const Json& source = manifest["source"];
+  EXPECT_EQ(source["format"], "layered");
+  EXPECT_EQ(source["files"][0]["path"], "lacquered_wood.layers.json");
+  EXPECT_GE(source["simulation"]["pairs"], 32768);
+  EXPECT_GE(source["simulation"]["paths"], 32 * source["simulation"]["pairs"].get<int>());
+  EXPECT_LT(source["simulation"]["standard_error"], 0.08);
+  EXPECT_EQ(source["simulation"]["effects"], Json({"rough refraction", "absorption", "colour"}));
+  EXPECT_EQ(source["simulation"]["left_out"], Json({"several layers", "anisotropy", "scattering"}));
+  // A black sphere would have less than .8; the rest is for the noise of the draft.
+  EXPECT_GT(manifest["quality"]["image_ssim"], 0.95);
+}
+
+TEST(LayeredMaterials, ImpossibleOnesAreBadInput) {
+  TempFolder folder;
+  const std::string file = folder / "odd.layers.json";
+  std::ofstream(file) << R"({"version": 1, "layers": [{"ior": 1.5, "thickness": -2}],
+                            "base": {"kind": "black"}})";
+  const Outcome baked = Patina({"bake", file, "--out", folder / "out"});
+  EXPECT_EQ(baked.exit_code, 3);
+  EXPECT_THAT(baked.err, AllOf(HasSubstr("odd.layers.json: /layers/0/thickness: -2"),
+                               HasSubstr("give 0 or more")));
+  EXPECT_FALSE(fs::exists(folder / "out/odd/current"));
+}
+
+}  // namespace
+}  // namespace patina
