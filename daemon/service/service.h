@@ -31,7 +31,7 @@ struct JobProgress {
   std::string stage;     // "ingest", "train" ...
   double fraction = -1;  // of the stage; -1: not known
   double eta_s = -1;
-  double psnr_db = 0;  // 0: not known
+  double psnr_db = 0;      // 0: not known
   double gain_10s_db = 0;  // what the next 10 seconds will likely add; 0: not known
   std::string message;
 };

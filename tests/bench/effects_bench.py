@@ -38,6 +38,7 @@ def parse_arguments():
     parser.add_argument("--quality", default="standard")
     parser.add_argument("--samples", help="samples of every training")
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--effects", type=words, default=list(EFFECTS), metavar="NAME,...", help="effects to turn off in turn")
     parser.add_argument("--lod-range", default="1,4", help="for the effect `mips`; 'none' leaves it out")
     parser.add_argument("--scenes-only", action="store_true", help="bake each scene once, and write only its summary")
     return parser.parse_args()
@@ -99,9 +100,10 @@ def mean_psnr(figures, maps):
 def variants(options):
     lod = [] if options.lod_range == "none" else ["--lod-range", options.lod_range]
     yield "all effects", []
-    for effect in EFFECTS[:-1]:
-        yield f"without {effect}", ["--effect-off", effect]
-    if lod:
+    for effect in options.effects:
+        if effect != "mips":
+            yield f"without {effect}", ["--effect-off", effect]
+    if lod and "mips" in options.effects:
         yield "with mips", lod
     yield "nothing left out", ["--learn-all"]
 

@@ -47,7 +47,7 @@ FakeService::FakeService() {
     job.record.job_json = "{\"version\": 1}";
   }
   jobs[2].record.state = JobState::kRunning;
-  jobs[2].progress = JobProgress{"train", 0.5, 12, 31, "on its way"};
+  jobs[2].progress = JobProgress{"train", 0.5, 12, 31, 0.25, "on its way"};
   jobs[3].record.state = JobState::kFailed;
   jobs[3].record.error_code = "corrupt_data";
   jobs[3].record.error_message = "albedo.png is cut off";

@@ -37,7 +37,7 @@ TEST_F(ServiceJobs, RunToTheirEnd) {
   EXPECT_EQ(Text(spec.fence), "1\n");
   EXPECT_EQ(Job(id).handle, "fake:1");
   executor_.running[id].events = {
-      R"({"type":"progress","stage":"train","fraction":0.25,"psnr_db":30.5})", "no json", "[1]"};
+      R"({"type":"progress","stage":"train","fraction":0.25,"psnr_db":30.5,"gain_10s_db":0.25})", "no json", "[1]"};
   service_->Step();
   const auto view = service_->Get(id);
   ASSERT_TRUE(view->progress);

@@ -14,12 +14,12 @@ using Json = nlohmann::json;
 TEST(ClientText, ListsJobs) {
   const Json answer = Json::parse(R"({"jobs": [
     {"id": 12, "asset": "wall", "state": "running", "priority": 0,
-     "progress": {"stage": "train", "fraction": 0.631, "psnr_db": 31.24, "eta_s": 75}},
+     "progress": {"stage": "train", "fraction": 0.631, "psnr_db": 31.24, "gain_10s_db": 0.118, "eta_s": 75}},
     {"id": 3, "asset": "flo\u001bor", "state": "failed", "priority": -5,
      "error": {"code": "corrupt_data", "message": "a.png: cut off"}}], "next_cursor": "3"})");
   EXPECT_EQ(JobsText(answer),
             "ID  STATE          PRIO  ASSET   REMARK\n"
-            "12  running        0     wall    train 63 %, 31.2 dB, 1 min 15 s left\n"
+            "12  running        0     wall    train 63 %, 31.2 dB (+0.12 in 10 s), 1 min 15 s left\n"
             "3   failed         -5    flo?or  a.png: cut off\n"
             "there are more; see --limit\n");
   EXPECT_EQ(JobsText(Json::parse(R"({"jobs": []})")), "no jobs\n");
