@@ -5,16 +5,19 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "daemon/base/clock.h"
+#include "daemon/execute/event_tail.h"
 #include "formats/container.h"
 #include "pipeline/jobs/run_guards.h"
 
 namespace patina::daemon {
 namespace {
 constexpr size_t kMostFolders = 10'000'000;
-}
+constexpr size_t kMostCurvePoints = 500;
+}  // namespace
 
 std::string JobFolders::FolderOf(int64_t id) const {
   return state_dir_ + "/jobs/" + std::to_string(id);
@@ -72,6 +75,31 @@ Result<std::string> JobFolders::ReadLog(int64_t id, int64_t* offset, size_t max_
   *offset = start + static_cast<int64_t>(done);
   *at_end = *offset >= size;
   return text;
+}
+
+std::vector<CurvePoint> JobFolders::ReadCurve(int64_t id, int64_t attempt) {
+  EventTail tail(AttemptFolder(id, attempt) + "/events.ndjson");
+  std::vector<CurvePoint> curve;
+  for (;;) {
+    const std::vector<std::string> lines = tail.Read(files_);
+    if (lines.empty()) return curve;
+    for (const std::string& line : lines) {
+      const auto event = nlohmann::json::parse(line, nullptr, false);
+      const auto number = [&event](const char* key) {
+        const auto found = event.find(key);
+        return found != event.end() && found->is_number() ? found->get<double>() : NAN;
+      };
+      if (!event.is_object()) continue;
+      const CurvePoint point{number("time_s"), number("psnr_db")};
+      if (!std::isfinite(point.time_s) || !std::isfinite(point.psnr_db)) continue;
+      curve.push_back(point);
+      if (curve.size() <= kMostCurvePoints) continue;
+      // Every other one goes; the newest stays.
+      size_t kept = 0;
+      for (size_t i = 0; i < curve.size(); i += 2) curve[kept++] = curve[i];
+      curve.resize(kept);
+    }
+  }
 }
 
 void JobFolders::Remove(int64_t id) { files_.RemoveTree(FolderOf(id)); }
