@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "daemon/base/clock.h"
 #include "daemon/execute/event_tail.h"
@@ -80,9 +81,10 @@ Result<std::string> JobFolders::ReadLog(int64_t id, int64_t* offset, size_t max_
 std::vector<CurvePoint> JobFolders::ReadCurve(int64_t id, int64_t attempt) {
   EventTail tail(AttemptFolder(id, attempt) + "/events.ndjson");
   std::vector<CurvePoint> curve;
-  for (;;) {
-    const std::vector<std::string> lines = tail.Read(files_);
-    if (lines.empty()) return curve;
+  std::optional<CurvePoint> newest;  // if it is not in the curve
+  size_t stride = 1, seen = 0;       // every stride-th point is taken
+  for (std::vector<std::string> lines = tail.Read(files_); !lines.empty();
+       lines = tail.Read(files_)) {
     for (const std::string& line : lines) {
       const auto event = nlohmann::json::parse(line, nullptr, false);
       const auto number = [&event](const char* key) {
@@ -92,14 +94,18 @@ std::vector<CurvePoint> JobFolders::ReadCurve(int64_t id, int64_t attempt) {
       if (!event.is_object()) continue;
       const CurvePoint point{number("time_s"), number("psnr_db")};
       if (!std::isfinite(point.time_s) || !std::isfinite(point.psnr_db)) continue;
+      newest = point;
+      if (seen++ % stride != 0) continue;
       curve.push_back(point);
-      if (curve.size() <= kMostCurvePoints) continue;
-      // Every other one goes; the newest stays.
-      size_t kept = 0;
-      for (size_t i = 0; i < curve.size(); i += 2) curve[kept++] = curve[i];
-      curve.resize(kept);
+      newest.reset();
+      if (curve.size() < kMostCurvePoints) continue;
+      for (size_t kept = 1; 2 * kept < curve.size(); ++kept) curve[kept] = curve[2 * kept];
+      curve.resize((curve.size() + 1) / 2);
+      stride *= 2;
     }
   }
+  if (newest) curve.push_back(*newest);
+  return curve;
 }
 
 void JobFolders::Remove(int64_t id) { files_.RemoveTree(FolderOf(id)); }

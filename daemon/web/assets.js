@@ -1,19 +1,36 @@
 // The assets: a page of them with pictures, sizes and quality; and one with all its revisions side by side.
 import {ApiError, blob, get, openFile, part} from "./api.js";
-import {announce, bytes, decibels, facts, failure, h, moment, refresh, replace, stateMark, table} from "./dom.js";
+import {announce, brief, bytes, decibels, facts, failure, h, moment, refresh, replace, stateMark, table} from "./dom.js";
 
 const PAGE = 24;
 const COMPARED = 4;
-// Where the source and what was decoded of the first map stand in a preview, in pixels.
-const CROP = {x: 10, y: 76, width: 394, height: 192};
+// How a preview is laid out, in pixels: pictures of at most TILE a side in columns, the first two of them the source and
+// what was decoded.
+const TILE = 192, LEFT = 10, TOP = 76, COLUMN = TILE + 10;
 
-// A picture of a container. On a canvas: an image of the page could not send the token.
-async function picture(path, alt, crop) {
+function canvasOf(alt, width, height) {
+  return h("canvas", {role: "img", "aria-label": alt, width, height});
+}
+
+// The preview of a container. On a canvas: an image of the page could not send the token.
+async function sheet(path, alt) {
   const image = await createImageBitmap(await blob(path));
-  const part = crop && image.width >= CROP.x + CROP.width && image.height >= CROP.y + CROP.height ? CROP
-    : {x: 0, y: 0, width: image.width, height: image.height};
-  const canvas = h("canvas", {role: "img", "aria-label": alt, width: part.width, height: part.height});
-  canvas.getContext("2d").drawImage(image, part.x, part.y, part.width, part.height, 0, 0, part.width, part.height);
+  const canvas = canvasOf(alt, image.width, image.height);
+  canvas.getContext("2d").drawImage(image, 0, 0);
+  image.close();
+  return canvas;
+}
+
+// Source and decoded of the first map alone, cut out of the preview.
+async function pair(path, alt, manifest) {
+  const image = await createImageBitmap(await blob(path));
+  const {width = TILE, height = TILE} = manifest.source || {};
+  const scale = Math.min(1, TILE / Math.max(width, height));
+  const [across, down] = [Math.max(1, Math.round(width * scale)), Math.max(1, Math.round(height * scale))];
+  const canvas = canvasOf(alt, 2 * TILE, TILE);
+  const context = canvas.getContext("2d");
+  for (const column of [0, 1])
+    context.drawImage(image, LEFT + column * COLUMN, TOP, across, down, column * TILE, 0, TILE - (column === 0 ? 2 : 0), TILE);
   image.close();
   return canvas;
 }
@@ -84,8 +101,8 @@ export function assetsView(parameters) {
     const key = `${asset.name}/${asset.revision}`;
     try {
       if (!kept.has(key)) {
-        kept.set(key, Promise.all([get(`${base}manifest.json`),
-          picture(`${base}preview.png`, `${asset.name}: source and decoded`, true).catch(() => null)]));
+        kept.set(key, get(`${base}manifest.json`).then(async manifest => [manifest,
+          await pair(`${base}preview.png`, `${asset.name}: source and decoded`, manifest).catch(() => null)]));
       }
       const [manifest, drawn] = await kept.get(key);
       if (closed) return;
@@ -103,7 +120,7 @@ export function assetsView(parameters) {
     const element = h("li", {}, view,
       h("p", {class: "name"}, h("a", {href: `#/asset/${part(asset.name)}`, "data-key": `asset${asset.name}`}, asset.name)),
       h("p", {}, stateMark(asset.state), asset.revision && h("small", {class: "quiet"}, ` ${asset.revision}`)),
-      figures, asset.reason && h("p", {class: "quiet reason"}, asset.reason.split("\n")[0].slice(0, 160)));
+      asset.revision && figures, asset.reason && h("p", {class: "quiet reason"}, brief(asset.reason)));
     if (asset.revision) {
       waiting.set(element, {asset, view, figures});
       seen.observe(element);
@@ -199,6 +216,7 @@ export function assetView(parameters, name) {
         const [a, b] = [columns[0].get(figure), columns[1].get(figure)];
         const change = a && b ? a.value - b.value : NaN;
         const good = a && a.better * change;
+        if (a && b && a.better === 0) return [figure, ...cells, change === 0 ? "same" : "differs"];
         cells.push(!Number.isFinite(change) ? "–" : change === 0 ? "same" : h("span", {class: good > 0 ? "good" : good < 0 ? "bad" : ""},
           (change > 0 ? "+" : "−") + (figure.includes("PSNR") || figure.endsWith("all mips") ? `${Math.abs(change).toFixed(2)} dB`
             : figure === "for an engine" || figure === "all files" ? bytes(Math.abs(change)) : Number(Math.abs(change).toPrecision(3)).toString())));
@@ -212,9 +230,12 @@ export function assetView(parameters, name) {
       ["profile", ...read.map(one => one.manifest.profile || "–")],
       ["quality setting", ...read.map(one => one.manifest.quality_setting || "–")], reports];
     if (read.length > 1) words.forEach(row => row.push(""));
-    const heads = ["", ...read.map(one => one.listed.revision + (one.listed.current ? " (current)" : ""))];
-    if (read.length > 1) heads.push(`${read[0].listed.revision} against ${read[1].listed.revision}`);
-    refresh(compared, table(read.length > 1 ? "The newest revisions side by side" : "The only revision", heads, [...words, ...rows], "numbers"),
+    const heads = ["", ...read.map(one => one.listed.revision)];
+    if (read.length > 1) heads.push("change");
+    const current = read.find(one => one.listed.current);
+    const caption = (read.length > 1 ? `Change: from ${read[1].listed.revision} to ${read[0].listed.revision}. ` : "The only revision. ") +
+      (current ? `${current.listed.revision} is current.` : "");
+    refresh(compared, table(caption, heads, [...words, ...rows], "numbers"),
       all.length > read.length && h("p", {class: "quiet"}, `${all.length - read.length} older: ${all.slice(read.length).map(one => one.revision).join(", ")}`));
   }
 
@@ -238,7 +259,7 @@ export function assetView(parameters, name) {
           h("a", {href: `#/job/${job.id}`, "data-key": `job${job.id}`}, `Job ${job.id}`), stateMark(job.state), moment(job.created)])));
       if (asset.revision && asset.revision !== shown) {
         shown = asset.revision;
-        const drawn = await picture(`${base}/files/preview.png`, `${name}: source, decoded and difference of each map`, false).catch(() => null);
+        const drawn = await sheet(`${base}/files/preview.png`, `${name}: source, decoded and difference of each map`).catch(() => null);
         if (!closed) replace(view, drawn || h("p", {class: "quiet"}, "This container has no preview."));
       } else if (!asset.revision) {
         replace(view, h("p", {class: "quiet"}, "Nothing is baked yet."));

@@ -94,6 +94,11 @@ export function table(caption, head, rows, kind) {
         h("tr", {}, h("th", {scope: "row"}, first), cells.map(cell => h("td", {}, cell)))))));
 }
 
+// The first line of a message, files without the folders they lie in.
+export function brief(text) {
+  return text.split("\n")[0].replace(/(^|\s)\/(?:[^\s/:]+\/)+/g, "$1").slice(0, 160);
+}
+
 const STATES = {
   queued: "Waiting", running: "Running", succeeded: "Done", failed: "Failed", cancelled: "Cancelled",
   retry_waiting: "Waits to retry", buried: "Given up", pending: "Settling", baked: "Baked", gone: "Source gone"

@@ -35,7 +35,7 @@ export function machineView() {
         watch.roots.length === 0 ? h("p", {class: "quiet"}, "None. patinad --watch DIR takes what is put into a folder.")
           : table("How each is watched", ["Folder", "How", "Because", "Folders", "Assets"], watch.roots.map(root => [
             root.path, root.mode, root.mode_reason, count(root.folders), count(root.assets)])),
-        watch.roots.length > 0 && h("p", {}, `${count(watch.events)} events, ${count(watch.overflows)} overflows, ${count(watch.rescans)} full looks.`),
+        watch.roots.length > 0 && h("p", {}, `Events: ${count(watch.events)}. Overflows: ${count(watch.overflows)}. Full looks: ${count(watch.rescans)}.`),
         watch.roots.length > 0 && h("p", {class: "actions"}, h("button", {type: "button", "data-key": "rescan", onclick: rescan}, "Look at everything again"))),
       h("section", {"aria-labelledby": "pending-title"}, h("h2", {id: "pending-title"}, "Not taken up yet"),
         status.pending.length === 0 ? h("p", {class: "quiet"}, "Nothing waits to become complete.")

@@ -1,6 +1,6 @@
 // The queue: what runs now, what waits and why, what has ended; and where files are dropped.
 import {get, part, post} from "./api.js";
-import {announce, count, duration, failure, facts, h, isFinal, moment, progressBar, progressText, refresh, replace, stateMark, table} from "./dom.js";
+import {announce, brief, count, duration, failure, facts, h, isFinal, moment, progressBar, progressText, refresh, replace, stateMark, table} from "./dom.js";
 import {uploadPanel} from "./upload.js";
 
 const PAGE = 25;
@@ -16,7 +16,7 @@ const FILTERS = [
 function what(job) {
   if (job.progress) return progressText(job.progress);
   if (job.waiting_reason) return job.waiting_reason;
-  if (job.error) return job.error.message.split("\n")[0].slice(0, 200);
+  if (job.error) return brief(job.error.message);
   if (job.revision) return `published as ${job.revision}`;
   return "";
 }
@@ -50,13 +50,14 @@ export function queueView(parameters) {
   const state = FILTERS.some(([key]) => key === parameters.get("state")) ? parameters.get("state") : "";
   const cursors = (parameters.get("before") || "").split(".").filter(text => /^[0-9]{1,18}$/.test(text));
   const summary = h("div", {});
-  const running = h("section", {"aria-labelledby": "running-title"});
+  const running = h("div", {});
   const filters = h("nav", {class: "filters", "aria-label": "Jobs by state"});
   const list = h("div", {});
   const trouble = h("div", {});
   const panel = uploadPanel();
   const element = h("div", {},
-    h("h1", {tabindex: "-1"}, "Queue"), trouble, summary, panel.element, running,
+    h("h1", {tabindex: "-1"}, "Queue"), trouble, summary, panel.element,
+    h("section", {"aria-labelledby": "running-title"}, h("h2", {id: "running-title"}, "Running now"), running),
     h("section", {"aria-labelledby": "jobs-title"}, h("h2", {id: "jobs-title"}, "Jobs"), filters, list));
   let cards = new Map();
   let paused = false;
@@ -95,11 +96,11 @@ export function queueView(parameters) {
         ["failed", count((jobs.failed || 0) + (jobs.buried || 0))],
         ["cores at work", `${status.cores_used} of ${status.cores}`]
       ]),
-      h("p", {class: "actions"},
+      h("p", {class: "actions aside"},
+        paused && h("span", {class: "bad"}, "The queue is paused: running jobs go on, no other starts."),
         h("button", {type: "button", "data-key": "pause",
           onclick: () => act(paused ? "/v1/queue/resume" : "/v1/queue/pause", paused ? "The queue goes on" : "The queue is paused")},
-          paused ? "Let the queue go on" : "Pause the queue"),
-        paused && h("span", {class: "bad"}, "The queue is paused: running jobs go on, no other starts.")),
+          paused ? "Let the queue go on" : "Pause the queue")),
       status.problems.length > 0 && h("ul", {class: "warnings"}, status.problems.map(text => h("li", {}, text))));
     refresh(filters, h("ul", {}, FILTERS.map(([key, name, states]) => {
       const total = states ? states.reduce((sum, one) => sum + (jobs[one] || 0), 0) : Object.values(jobs).reduce((sum, n) => sum + n, 0);
@@ -110,7 +111,7 @@ export function queueView(parameters) {
 
   function showRunning(jobs, total) {
     cards = new Map();
-    refresh(running, h("h2", {id: "running-title"}, "Running now"),
+    refresh(running,
       jobs.length === 0 ? h("p", {class: "quiet"}, "Nothing. What is dropped here, or into a watched folder, starts by itself.")
         : h("ul", {class: "cards wide"}, jobs.map(job => {
           const made = runningCard(job, stop);

@@ -140,6 +140,8 @@ def use(page, daemon, sample, folder):
     page.look(1280, "light")
     page.open(daemon.url + "/")
     page.wait_until("document.getElementById('ask').open", "the question for the token")
+    # A browser reports each answer of 401 by itself.
+    wrong.extend(text for text in page.complaints() if "401" not in text)
     check("token")
     give = """(token => { const input = document.getElementById('token'); input.value = token;
       document.querySelector('#ask form').requestSubmit(); return true; })"""
@@ -147,7 +149,6 @@ def use(page, daemon, sample, folder):
     page.wait_until("document.getElementById('ask').open && !document.getElementById('ask-wrong').hidden", "that it is refused")
     page.value(give + f"({json.dumps(TOKEN)})")
     page.wait_until("document.querySelector('#link.up') && document.querySelector('main .facts')", "the queue")
-    # A browser reports each answer of 401 by itself.
     wrong.extend(text for text in page.complaints() if "401" not in text)
     if TOKEN in page.value("document.cookie + JSON.stringify(localStorage) + location.href + document.documentElement.outerHTML"):
         wrong.append("the token is where it does not belong")
