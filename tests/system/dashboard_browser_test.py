@@ -101,6 +101,12 @@ class Daemon:
         with urllib.request.urlopen(request, timeout=60) as answer:
             return json.load(answer)
 
+    def post(self, path, body):
+        request = urllib.request.Request(self.url + path, json.dumps(body).encode(), method="POST",
+                                         headers={"Authorization": "Bearer " + TOKEN, "Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return json.load(answer)
+
     def stop(self):
         self._process.send_signal(signal.SIGTERM)
         self._process.send_signal(signal.SIGINT)
@@ -180,9 +186,7 @@ def use(page, daemon, sample, folder):
         wrong.append("text of a file's name became markup")
     request = daemon.get("/v1/jobs/" + job.split("/")[-1])["job"]
     request["seed"] = 2
-    page.value(f"""fetch('/v1/jobs', {{method: 'POST', headers: {{'Content-Type': 'application/json',
-      Authorization: 'Bearer ' + sessionStorage.getItem('patina-token')}}, body: JSON.stringify({json.dumps({"job": request})})}})
-      .then(answer => answer.status)""")
+    daemon.post("/v1/jobs", {"job": request})
     page.wait_until("document.querySelectorAll('.jobs .is-succeeded').length >= 2", "the second revision", 400)
     check("queue", "document.querySelector('.jobs .is-failed')")
 
