@@ -12,7 +12,7 @@ class TrainingCurve : public ::testing::Test {
  protected:
   std::vector<CurvePoint> Read(const std::string& events) {
     std::filesystem::create_directories(folder_ / "jobs/7/a2");
-    EXPECT_OK(WriteFileDurably(folder_ / "jobs/7/a2/events.ndjson", events));
+    EXPECT_TRUE(WriteFileDurably(folder_ / "jobs/7/a2/events.ndjson", events));
     return JobFolders(folder_.path(), RealFileCalls()).ReadCurve(7, 2);
   }
   static std::string Progress(double time_s, double psnr_db) {
