@@ -113,6 +113,13 @@ class Daemon {
                         {"out", config_.out},
                         {"socket", config_.api.socket},
                         {"cores", config_.cores}});
+    if (api_->tcp_port() != 0) {
+      const bool v6 = config_.api.listen_host.find(':') != std::string::npos;
+      log_.Info("dashboard",
+                {{"url", "http://" +
+                             (v6 ? "[" + config_.api.listen_host + "]" : config_.api.listen_host) +
+                             ":" + std::to_string(api_->tcp_port()) + "/"}});
+    }
     NotifyServiceManager("READY=1");
     Follow();
     log_.Info("stopped");
@@ -145,8 +152,11 @@ class Daemon {
     if (!config_.watch.empty()) {
       PATINA_ASSIGN(folders_, DropFolders::Start(config_, *service_, log_));
     }
+    UploadOptions uploads;
+    uploads.folder = UploadFolderOf(config_);
+    uploads.files = &files_;
     PATINA_ASSIGN(api_, ApiServer::Start(config_.api, config_.out, service_.get(),
-                                         folders_ ? folders_->source() : nullptr, &log_));
+                                         folders_ ? folders_->source() : nullptr, &log_, uploads));
     return {};
   }
 

@@ -1,6 +1,6 @@
 # patina_embed_texts(OUTPUT file.cpp HEADER header.h TYPE type ARRAY array COUNT count SUFFIX suffix FILES ...)
 # Writes a C++ file that defines `const TYPE ARRAY[]` of {name, text} and `const int COUNT` for the files, in order of name;
-# names lose the suffix. CMake runs again when one of the files changes.
+# names lose the suffix, if one is given. CMake runs again when one of the files changes.
 function(patina_embed_texts)
   cmake_parse_arguments(ARG "" "OUTPUT;HEADER;TYPE;ARRAY;COUNT;SUFFIX" "FILES" ${ARGN})
   list(SORT ARG_FILES)
@@ -10,7 +10,9 @@ function(patina_embed_texts)
   list(JOIN code "" code)
   foreach(path ${ARG_FILES})
     get_filename_component(name ${path} NAME)
-    string(REPLACE "${ARG_SUFFIX}" "" name ${name})
+    if(ARG_SUFFIX)
+      string(REPLACE "${ARG_SUFFIX}" "" name ${name})
+    endif()
     file(READ ${path} text)
     string(APPEND code "{\"${name}\", R\"PATINA_TEXT(${text})PATINA_TEXT\"},\n")
   endforeach()

@@ -68,4 +68,26 @@ bool IsLocalHost(std::string_view host) {
          host.find_first_not_of("0123456789.") == std::string_view::npos;
 }
 
+bool IsCrossSite(const HttpRequest& request) {
+  const std::string_view origin = request.Header("Origin");
+  if (!origin.empty()) {
+    const size_t scheme = origin.find("://");
+    const std::string_view host = request.Header("Host");
+    if (scheme == std::string_view::npos) return true;  // "null": a sandboxed page, or a file
+    const std::string_view from = origin.substr(scheme + 3);
+    if (from.size() != host.size() || strncasecmp(from.data(), host.data(), host.size()) != 0)
+      return true;
+  }
+  if (request.method == "GET") return false;
+  const std::string_view site = request.Header("Sec-Fetch-Site");
+  if (!site.empty() && site != "same-origin" && site != "none") return true;
+  const std::string_view type = request.Header("Content-Type");
+  for (const std::string_view form :
+       {"application/x-www-form-urlencoded", "multipart/form-data", "text/plain"}) {
+    if (type.size() >= form.size() && strncasecmp(type.data(), form.data(), form.size()) == 0)
+      return true;
+  }
+  return false;
+}
+
 }  // namespace patina::daemon

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "daemon/api/http_types.h"
 #include "formats/base/result.h"
 
 namespace patina::daemon {
@@ -19,5 +20,10 @@ bool CarriesToken(std::string_view authorization, std::string_view token);
 // Whether a Host header means this machine: 127.x.y.z, [::1] or localhost, with any port. A page of
 // another site whose name was made to point here carries that site's name.
 bool IsLocalHost(std::string_view host);
+
+// Whether a browser sends a request for a page of another site: its Origin is not the Host that is
+// asked, or, of what changes something, Sec-Fetch-Site says so, or the body is of a type that a
+// form can send anywhere unasked. What is no browser sends none of these.
+bool IsCrossSite(const HttpRequest& request);
 
 }  // namespace patina::daemon

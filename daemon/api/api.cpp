@@ -1,17 +1,17 @@
 #include "daemon/api/api.h"
 
 #include <algorithm>
-#include <charconv>
 
 #include "daemon/api/access.h"
 #include "daemon/api/api_json.h"
+#include "daemon/api/api_parts.h"
 #include "daemon/api/container_files.h"
+#include "daemon/api/dashboard.h"
 #include "daemon/api/metrics_text.h"
 #include "daemon/api/openapi_text.h"
 #include "daemon/api/problem.h"
 #include "daemon/api/submit_body.h"
 #include "formats/base/names.h"
-#include "formats/base/sha256.h"
 #include "pipeline/jobs/job.h"
 
 namespace patina::daemon {
@@ -34,11 +34,19 @@ constexpr ApiRoute kRoutes[] = {
     {"POST", "/v1/jobs/{id}/release", "releaseJob"},
     {"POST", "/v1/jobs/{id}/priority", "setJobPriority"},
     {"GET", "/v1/jobs/{id}/log", "getJobLog"},
+    {"GET", "/v1/jobs/{id}/curve", "getJobCurve"},
     {"GET", "/v1/events", "streamEvents"},
     {"GET", "/v1/assets", "listAssets"},
     {"GET", "/v1/assets/{name}", "getAsset"},
     {"GET", "/v1/assets/{name}/files", "listAssetFiles"},
     {"GET", "/v1/assets/{name}/files/{file}", "getAssetFile"},
+    {"GET", "/v1/assets/{name}/revisions", "listRevisions"},
+    {"GET", "/v1/assets/{name}/revisions/{revision}/files/{file}", "getRevisionFile"},
+    {"POST", "/v1/uploads", "beginUpload"},
+    {"POST", "/v1/uploads/{upload}/files/{file}", "writeUpload"},
+    {"POST", "/v1/uploads/{upload}/submit", "submitUpload"},
+    {"POST", "/v1/uploads/{upload}/drop", "dropUpload"},
+    {"POST", "/v1/tickets", "issueTicket"},
     {"GET", "/v1/status", "getStatus"},
     {"POST", "/v1/queue/pause", "pauseQueue"},
     {"POST", "/v1/queue/resume", "resumeQueue"},
@@ -47,6 +55,8 @@ constexpr ApiRoute kRoutes[] = {
     {"GET", "/healthz", "getHealth"},
     {"GET", "/readyz", "getReadiness"},
     {"GET", "/metrics", "getMetrics"},
+    {"GET", "/", "getDashboard"},
+    {"GET", "/web/{file}", "getDashboardFile"},
 };
 
 // The parts between slashes; "/a/b" gives a, b.
@@ -81,131 +91,29 @@ bool Fits(const std::string& path, const char* pattern, std::vector<std::string>
   return parts.size() == wanted.size();
 }
 
-bool ParseInteger(std::string_view text, int64_t least, int64_t most, int64_t* value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *value);
-  return error == std::errc() && end == text.data() + text.size() && !text.empty() &&
-         *value >= least && *value <= most;
-}
-
-HttpResponse JsonResponse(int status, std::string body) {
-  HttpResponse response;
-  response.status = status;
-  response.body = std::move(body);
-  return response;
-}
-
-HttpResponse FieldsRefused(const std::vector<FieldProblem>& problems) {
-  std::string detail = std::to_string(problems.size()) +
-                       (problems.size() == 1 ? " thing is wrong" : " things are wrong");
-  for (const FieldProblem& problem : problems)
-    detail += (&problem == problems.data() ? ": " : "; ") +
-              (problem.pointer.empty() ? "the body" : problem.pointer) + " " + problem.detail;
-  return ProblemResponse(400, "invalid_argument", detail, problems);
-}
-
-// The parameters of a query; notes what is wrong with them.
-class Query {
- public:
-  explicit Query(const HttpRequest& request) : request_(request) {}
-
-  // nullptr if it is absent.
-  const std::string* Find(const std::string& name) {
-    known_.push_back(name);
-    const std::string* found = nullptr;
-    for (const auto& [key, value] : request_.query) {
-      if (key != name) continue;
-      if (found != nullptr) Complain(name, "stands twice");
-      found = &value;
-    }
-    return found;
-  }
-
-  int64_t Integer(const std::string& name, int64_t least, int64_t most, int64_t absent) {
-    const std::string* text = Find(name);
-    int64_t value = absent;
-    if (text == nullptr || ParseInteger(*text, least, most, &value)) return value;
-    Complain(name, "must be a whole number from " + std::to_string(least) + " to " +
-                       std::to_string(most) + "; is " + QuoteForMessage(*text));
-    return absent;
-  }
-
-  void Complain(const std::string& name, const std::string& detail) {
-    problems_.push_back({"?" + name, detail});
-  }
-
-  // After all that is known was asked for.
-  std::vector<FieldProblem> Problems() {
-    for (const auto& [key, value] : request_.query) {
-      if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
-      std::string list;
-      for (const std::string& name : known_) list += (list.empty() ? "" : ", ") + name;
-      problems_.push_back(
-          {"?" + QuoteForMessage(key), list.empty() ? "is not known; this path takes no parameters"
-                                                    : "is not known; known are " + list});
-      if (problems_.size() >= 20) break;
-    }
-    return problems_;
-  }
-
- private:
-  const HttpRequest& request_;
-  std::vector<std::string> known_;
-  std::vector<FieldProblem> problems_;
-};
-
-std::string Revised(const std::string& text) {
-  return "\"" + Sha256Hex(std::string_view(text)).substr(0, 32) + "\"";
-}
-
-// Whether an If-None-Match header names the tag.
-bool NamesTag(std::string_view header, const std::string& tag) {
-  if (header == "*") return true;
-  for (size_t at = header.find(tag); at != std::string_view::npos; at = header.find(tag, at + 1)) {
-    const size_t end = at + tag.size();
-    const bool begins = at == 0 || header[at - 1] == ' ' || header[at - 1] == ',' ||
-                        header[at - 1] == '/';  // W/"..." is as good here
-    if (begins && (end == header.size() || header[end] == ',' || header[end] == ' ')) return true;
-  }
-  return false;
-}
-
-HttpResponse WithTag(const HttpRequest& request, std::string body) {
-  const std::string tag = Revised(body);
-  HttpResponse response;
-  if (NamesTag(request.Header("If-None-Match"), tag)) {
-    response.status = 304;
-  } else {
-    response.body = std::move(body);
-  }
-  response.headers.emplace_back("ETag", tag);
-  return response;
-}
-
 }  // namespace
-
-struct Api::Call {
-  const HttpRequest& request;
-  std::vector<std::string> arguments;
-  int64_t id = 0;  // of {id}
-};
 
 std::span<const ApiRoute> ApiRoutes() { return kRoutes; }
 
 Api::Handler Api::HandlerOf(size_t route) {
   constexpr Handler kHandlers[] = {
-      &Api::SubmitJob,      &Api::ListJobs,     &Api::GetJob,         &Api::CancelJob,
-      &Api::RetryJob,       &Api::HoldJob,      &Api::ReleaseJob,     &Api::SetJobPriority,
-      &Api::GetJobLog,      &Api::StreamEvents, &Api::ListAssets,     &Api::GetAsset,
-      &Api::ListAssetFiles, &Api::GetAssetFile, &Api::GetStatus,      &Api::PauseQueue,
-      &Api::ResumeQueue,    &Api::Rescan,       &Api::GetDescription, &Api::GetHealth,
-      &Api::GetReadiness,   &Api::GetMetrics,
+      &Api::SubmitJob,       &Api::ListJobs,       &Api::GetJob,         &Api::CancelJob,
+      &Api::RetryJob,        &Api::HoldJob,        &Api::ReleaseJob,     &Api::SetJobPriority,
+      &Api::GetJobLog,       &Api::GetJobCurve,    &Api::StreamEvents,   &Api::ListAssets,
+      &Api::GetAsset,        &Api::ListAssetFiles, &Api::GetAssetFile,   &Api::ListRevisions,
+      &Api::GetRevisionFile, &Api::BeginUpload,    &Api::WriteUpload,    &Api::SubmitUpload,
+      &Api::DropUpload,      &Api::IssueTicket,    &Api::GetStatus,      &Api::PauseQueue,
+      &Api::ResumeQueue,     &Api::Rescan,         &Api::GetDescription, &Api::GetHealth,
+      &Api::GetReadiness,    &Api::GetMetrics,     &Api::GetDashboard,   &Api::GetDashboardFile,
   };
   static_assert(std::size(kHandlers) == std::size(kRoutes));
   return kHandlers[route];
 }
 
 Api::Api(const ApiOptions& options, Service* service, AssetSource* source, Logger* log)
-    : options_(options), service_(service), source_(source), log_(log) {}
+    : options_(options), service_(service), source_(source), log_(log) {
+  if (!options.uploads.folder.empty()) uploads_ = std::make_unique<Uploads>(options.uploads);
+}
 
 HttpResponse Api::Refuse(int status) {
   ++requests_;
@@ -218,6 +126,7 @@ HttpResponse Api::Handle(const HttpRequest& request) {
   if (response.status == 200) response = Route(request);
   response.headers.emplace_back("X-Content-Type-Options", "nosniff");
   response.headers.emplace_back("Cache-Control", "no-store");
+  response.headers.emplace_back("Referrer-Policy", "no-referrer");
   ++requests_;
   if (response.status >= 400) ++refused_;
   if (response.status >= 500) {
@@ -229,10 +138,17 @@ HttpResponse Api::Handle(const HttpRequest& request) {
   return response;
 }
 
-HttpResponse Api::CheckAccess(const HttpRequest& request) const {
+HttpResponse Api::CheckAccess(const HttpRequest& request) {
+  // A reverse proxy before the Unix socket may know its users by what browsers send by themselves.
+  if (IsCrossSite(request)) {
+    return ProblemResponse(403, "forbidden",
+                           "a page of another site asks, or a reverse proxy does not pass the Host "
+                           "header on, which must be that of the Origin header");
+  }
   if (!request.over_tcp) return {};
   if (!IsLocalHost(request.Header("Host"))) return TransportProblem(403);
-  if (request.path == "/healthz") return {};
+  if (request.path == "/healthz" || IsDashboardPath(request.path)) return {};
+  if (request.method == "GET" && AdmitsTicket(request)) return {};
   if (options_.token.empty() || !CarriesToken(request.Header("Authorization"), options_.token))
     return TransportProblem(401);
   return {};
@@ -482,26 +398,7 @@ HttpResponse Api::GetAssetFile(const Call& call) {
   if (!asset) return ProblemResponse(asset.error());
   if (asset->container.empty())
     return ProblemResponse(404, "not_found", "the asset has no container yet");
-  auto file = OpenBelow(asset->container, call.arguments[1]);
-  if (!file) return ProblemResponse(file.error());
-  HttpResponse response;
-  const std::string tag =
-      Revised(asset->container + "/" + call.arguments[1] + " " + std::to_string(file->mtime_ns) +
-              " " + std::to_string(file->bytes));
-  response.headers.emplace_back("ETag", tag);
-  if (NamesTag(call.request.Header("If-None-Match"), tag)) {
-    response.status = 304;
-    return response;
-  }
-  response.content_type = ContentTypeOf(call.arguments[1]);
-  // A report is a page of its own and runs nothing.
-  response.headers.emplace_back(
-      "Content-Security-Policy",
-      "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox");
-  if (file->bytes == 0) return response;
-  response.file = std::move(file->fd);
-  response.file_bytes = file->bytes;
-  return response;
+  return SendContainerFile(call.request, asset->container, call.arguments[1]);
 }
 
 // ---- the service -----------------------------------------------------------------------------

@@ -154,6 +154,51 @@ std::string FileListJson(const AssetView& asset, const std::vector<ContainerFile
   return Text(json);
 }
 
+std::string RevisionListJson(const AssetView& asset, const std::vector<ListedRevision>& revisions) {
+  Json json;
+  json["asset"] = asset.name;
+  json["revisions"] = Json::array();
+  for (const ListedRevision& revision : revisions) {
+    Json entry = {
+        {"revision", revision.name}, {"current", revision.current}, {"bytes", revision.bytes}};
+    SetTime(&entry, "published", revision.published_ms);
+    json["revisions"].push_back(std::move(entry));
+  }
+  return Text(json);
+}
+
+std::string CurveJson(const std::vector<CurvePoint>& curve) {
+  Json json;
+  json["points"] = Json::array();
+  for (const CurvePoint& point : curve)
+    json["points"].push_back({{"time_s", point.time_s}, {"psnr_db", point.psnr_db}});
+  return Text(json);
+}
+
+std::string UploadedJson(const std::vector<UploadedJob>& jobs) {
+  Json json;
+  json["jobs"] = Json::array();
+  json["refused"] = Json::array();
+  for (const UploadedJob& job : jobs) {
+    if (job.job > 0) {
+      json["jobs"].push_back({{"asset", job.asset}, {"id", job.job}});
+    } else {
+      json["refused"].push_back({{"asset", job.asset}, {"detail", job.problem}});
+    }
+  }
+  return Text(json);
+}
+
+std::string UploadJson(const std::string& id, uint64_t piece_bytes) {
+  return Text({{"upload", id}, {"url", "/v1/uploads/" + id}, {"piece_bytes", piece_bytes}});
+}
+
+std::string PieceJson(uint64_t bytes) { return Text({{"bytes", bytes}}); }
+
+std::string TicketJson(const std::string& url, int64_t seconds) {
+  return Text({{"url", url}, {"seconds", seconds}});
+}
+
 std::string StatusJson(const ServiceStatus& status) {
   Json json;
   json["version"] = status.version;

@@ -50,9 +50,11 @@ class RunningApi : public ApiServer {
 Result<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiConfig& config,
                                                     const std::string& default_out,
                                                     Service* service, AssetSource* source,
-                                                    Logger* log) {
+                                                    Logger* log, const UploadOptions& uploads) {
   ApiOptions options;
   options.default_out = default_out;
+  options.uploads = uploads;
+  options.max_body_bytes = config.max_body_bytes;
   options.max_event_clients = config.max_event_clients;
   if (!config.listen_host.empty()) {
     if (config.token_file.empty()) {

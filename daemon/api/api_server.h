@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "daemon/api/uploads.h"
 #include "daemon/base/log.h"
 #include "daemon/config/config.h"
 #include "daemon/service/service.h"
@@ -17,7 +18,8 @@ class ApiServer {
   // UnixListener, OpenTcpListener and ReadTokenFile; kInvalidArgument: TCP without a token file.
   static Result<std::unique_ptr<ApiServer>> Start(const ApiConfig& config,
                                                   const std::string& default_out, Service* service,
-                                                  AssetSource* source, Logger* log);
+                                                  AssetSource* source, Logger* log,
+                                                  const UploadOptions& uploads = {});
   // Ends all connections and removes the socket.
   virtual ~ApiServer() = default;
 

@@ -12,6 +12,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/base/names.h"
+#include "formats/container.h"
 
 namespace patina::daemon {
 namespace {
@@ -75,6 +76,36 @@ Result<std::vector<ContainerFile>> FilesBelow(const std::string& folder) {
   std::sort(files.begin(), files.end(),
             [](const ContainerFile& a, const ContainerFile& b) { return a.name < b.name; });
   return files;
+}
+
+Result<std::vector<AssetRevision>> RevisionsOf(const std::string& asset_folder) {
+  std::vector<AssetRevision> revisions;
+  std::error_code error;
+  for (fs::directory_iterator entry(asset_folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    std::error_code ignored;
+    // Neither `current`, nor what is still being made, nor `rejected`.
+    const bool numbered = name.size() > 1 && name[0] == 'r' &&
+                          name.find_first_not_of("0123456789", 1) == std::string::npos;
+    if (!numbered || entry->is_symlink(ignored) || !entry->is_directory(ignored)) continue;
+    struct stat info {};
+    if (lstat((entry->path() / kManifestName).c_str(), &info) != 0 || !S_ISREG(info.st_mode))
+      continue;
+    revisions.push_back({name, entry->path().string(),
+                         info.st_mtim.tv_sec * int64_t{1000} + info.st_mtim.tv_nsec / 1000000});
+  }
+  if (error) {
+    return Fail(
+        error == std::errc::no_such_file_or_directory ? ErrorCode::kNotFound : ErrorCode::kIo,
+        "cannot list the revisions: " + error.message());
+  }
+  // Numbers have four digits, or more and then none in front.
+  std::sort(revisions.begin(), revisions.end(), [](const AssetRevision& a, const AssetRevision& b) {
+    return a.name.size() != b.name.size() ? a.name.size() > b.name.size() : a.name > b.name;
+  });
+  if (revisions.size() > kMaxFiles) revisions.resize(kMaxFiles);
+  return revisions;
 }
 
 const char* ContentTypeOf(const std::string& name) {

@@ -25,6 +25,15 @@ Result<OpenedFile> OpenBelow(const std::string& folder, const std::string& name)
 // The files below a folder, sorted, at most 1000; links are left out. Errors: kNotFound, kIo.
 Result<std::vector<ContainerFile>> FilesBelow(const std::string& folder);
 
+// The revisions of an asset's folder <out>/<asset> that are whole, newest first, at most 1000.
+// Errors: kNotFound, kIo.
+struct AssetRevision {
+  std::string name;  // "r0002"
+  std::string container;
+  int64_t published_ms = 0;  // when the manifest was written
+};
+Result<std::vector<AssetRevision>> RevisionsOf(const std::string& asset_folder);
+
 const char* ContentTypeOf(const std::string& name);
 
 }  // namespace patina::daemon

@@ -58,6 +58,20 @@ class Reader {
     return std::nullopt;
   }
 
+  std::string Text(const char* key) {
+    const Json* value = Find(key);
+    if (value != nullptr && value->is_string()) return value->get<std::string>();
+    Complain(key, value == nullptr ? "is missing" : "must be a text");
+    return "";
+  }
+
+  bool Flag(const char* key) {
+    const Json* value = Find(key);
+    if (value == nullptr) return false;
+    if (!value->is_boolean()) Complain(key, "must be true or false");
+    return value->is_boolean() && value->get<bool>();
+  }
+
   void RefuseUnknown() {
     for (const auto& [key, value] : object_.items()) {
       if (known_.count(key) != 0) continue;
@@ -134,13 +148,7 @@ ParsedSubmit ParseSubmit(std::string_view body, const std::string& default_out) 
   if (const Json* limits = reader.Find("limits")) ReadLimits(*limits, &parsed);
   parsed.request.priority =
       static_cast<int>(reader.Integer("priority", kMinPriority, kMaxPriority).value_or(0));
-  if (const Json* force = reader.Find("force")) {
-    if (force->is_boolean()) {
-      parsed.request.force = force->get<bool>();
-    } else {
-      reader.Complain("force", "must be true or false");
-    }
-  }
+  parsed.request.force = reader.Flag("force");
   reader.RefuseUnknown();
   parsed.problems.insert(parsed.problems.begin(), problems.begin(), problems.end());
   return parsed;
@@ -169,6 +177,65 @@ ParsedPriority ParsePriority(std::string_view body) {
     parsed.priority =
         static_cast<int>(reader.Integer("priority", kMinPriority, kMaxPriority).value_or(0));
   }
+  reader.RefuseUnknown();
+  return parsed;
+}
+
+ParsedUpload ParseUpload(std::string_view body) {
+  ParsedUpload parsed;
+  Json json;
+  if (!Parse(body, &json, &parsed.problems)) return parsed;
+  Reader reader(json, "", &parsed.problems);
+  parsed.name = reader.Text("name");
+  const Json* files = reader.Find("files");
+  if (files == nullptr || !files->is_array()) {
+    reader.Complain("files", files == nullptr ? "is missing" : "must be a list");
+  } else {
+    for (size_t i = 0; i < files->size(); ++i) {
+      const std::string at = "/files/" + std::to_string(i);
+      if (!(*files)[i].is_object()) {
+        reader.Complain("files", "has an entry that is no object: " + std::to_string(i));
+        continue;
+      }
+      Reader entry((*files)[i], at, &parsed.problems);
+      UploadFile file;
+      file.name = entry.Text("name");
+      if (entry.Find("bytes") == nullptr) entry.Complain("bytes", "is missing");
+      file.bytes = static_cast<uint64_t>(entry.Integer("bytes", 0, kMaxLimit).value_or(0));
+      entry.RefuseUnknown();
+      parsed.files.push_back(std::move(file));
+    }
+  }
+  reader.RefuseUnknown();
+  return parsed;
+}
+
+ParsedUploadSubmit ParseUploadSubmit(std::string_view body) {
+  ParsedUploadSubmit parsed;
+  Json json;
+  if (!Parse(body, &json, &parsed.problems)) return parsed;
+  Reader reader(json, "", &parsed.problems);
+  if (reader.Find("quality") != nullptr) {
+    const auto quality = ParseQuality(reader.Text("quality"));
+    if (quality) parsed.quality = *quality;
+    if (!quality) reader.Complain("quality", "must be preview, standard or reference");
+  }
+  parsed.priority =
+      static_cast<int>(reader.Integer("priority", kMinPriority, kMaxPriority).value_or(0));
+  parsed.force = reader.Flag("force");
+  reader.RefuseUnknown();
+  return parsed;
+}
+
+ParsedTicket ParseTicket(std::string_view body) {
+  ParsedTicket parsed;
+  Json json;
+  if (!Parse(body, &json, &parsed.problems)) return parsed;
+  Reader reader(json, "", &parsed.problems);
+  parsed.path = reader.Text("path");
+  if (parsed.problems.empty() &&
+      (parsed.path.substr(0, 11) != "/v1/assets/" || parsed.path.size() > 8192))
+    reader.Complain("path", "must be that of an asset's file");
   reader.RefuseUnknown();
   return parsed;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/api/problem.h"
+#include "daemon/api/uploads.h"
 #include "daemon/service/service.h"
 
 namespace patina::daemon {
@@ -29,5 +30,30 @@ struct ParsedPriority {
   std::vector<FieldProblem> problems;
 };
 ParsedPriority ParsePriority(std::string_view body);
+
+// The body of POST /v1/uploads: {"name": "wall", "files": [{"name": "wall_ao.png", "bytes": 1}]}.
+struct ParsedUpload {
+  std::string name;
+  std::vector<UploadFile> files;
+  std::vector<FieldProblem> problems;
+};
+ParsedUpload ParseUpload(std::string_view body);
+
+// The body of POST /v1/uploads/{upload}/submit: {"quality": "standard", "priority": 0, "force":
+// false}; all may be absent.
+struct ParsedUploadSubmit {
+  Quality quality = Quality::kStandard;
+  int priority = 0;
+  bool force = false;
+  std::vector<FieldProblem> problems;
+};
+ParsedUploadSubmit ParseUploadSubmit(std::string_view body);
+
+// The body of POST /v1/tickets: {"path": "/v1/assets/wall/files/report.html"}.
+struct ParsedTicket {
+  std::string path;
+  std::vector<FieldProblem> problems;
+};
+ParsedTicket ParseTicket(std::string_view body);
 
 }  // namespace patina::daemon

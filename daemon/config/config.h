@@ -116,6 +116,9 @@ struct LoadedConfig {
 LoadedConfig LoadConfig(const std::string& file, const std::vector<std::string>& environment,
                         const ConfigOverrides& flags);
 
+// Where the API puts what clients send; jobs may read it.
+inline std::string UploadFolderOf(const Config& config) { return config.state_dir + "/uploads"; }
+
 // The configuration in effect, as a configuration file.
 std::string ConfigToJson(const Config& config);
 

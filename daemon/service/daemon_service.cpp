@@ -213,6 +213,11 @@ class RealService : public DaemonService {
     return chunk;
   }
 
+  Result<std::vector<CurvePoint>> Curve(int64_t id) override {
+    PATINA_ASSIGN(const JobRecord job, parts_.store.Get(id));
+    return folders_.ReadCurve(id, job.attempt);
+  }
+
   Result<std::unique_ptr<Subscription>> Subscribe(std::optional<int64_t> after,
                                                   int64_t job) override {
     return hub_->Subscribe(after, job);

@@ -5,16 +5,20 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "daemon/base/clock.h"
+#include "daemon/execute/event_tail.h"
 #include "formats/container.h"
 #include "pipeline/jobs/run_guards.h"
 
 namespace patina::daemon {
 namespace {
 constexpr size_t kMostFolders = 10'000'000;
-}
+constexpr size_t kMostCurvePoints = 500;
+}  // namespace
 
 std::string JobFolders::FolderOf(int64_t id) const {
   return state_dir_ + "/jobs/" + std::to_string(id);
@@ -72,6 +76,36 @@ Result<std::string> JobFolders::ReadLog(int64_t id, int64_t* offset, size_t max_
   *offset = start + static_cast<int64_t>(done);
   *at_end = *offset >= size;
   return text;
+}
+
+std::vector<CurvePoint> JobFolders::ReadCurve(int64_t id, int64_t attempt) {
+  EventTail tail(AttemptFolder(id, attempt) + "/events.ndjson");
+  std::vector<CurvePoint> curve;
+  std::optional<CurvePoint> newest;  // if it is not in the curve
+  size_t stride = 1, seen = 0;       // every stride-th point is taken
+  for (std::vector<std::string> lines = tail.Read(files_); !lines.empty();
+       lines = tail.Read(files_)) {
+    for (const std::string& line : lines) {
+      const auto event = nlohmann::json::parse(line, nullptr, false);
+      const auto number = [&event](const char* key) {
+        const auto found = event.find(key);
+        return found != event.end() && found->is_number() ? found->get<double>() : NAN;
+      };
+      if (!event.is_object()) continue;
+      const CurvePoint point{number("time_s"), number("psnr_db")};
+      if (!std::isfinite(point.time_s) || !std::isfinite(point.psnr_db)) continue;
+      newest = point;
+      if (seen++ % stride != 0) continue;
+      curve.push_back(point);
+      newest.reset();
+      if (curve.size() < kMostCurvePoints) continue;
+      for (size_t kept = 1; 2 * kept < curve.size(); ++kept) curve[kept] = curve[2 * kept];
+      curve.resize((curve.size() + 1) / 2);
+      stride *= 2;
+    }
+  }
+  if (newest) curve.push_back(*newest);
+  return curve;
 }
 
 void JobFolders::Remove(int64_t id) { files_.RemoveTree(FolderOf(id)); }

@@ -11,6 +11,7 @@
 
 #include "daemon/base/file_calls.h"
 #include "daemon/queue/job_store.h"
+#include "daemon/service/service.h"
 #include "formats/base/result.h"
 
 namespace patina::daemon {
@@ -34,6 +35,9 @@ class JobFolders {
 
   // Part of a log; see Service::ReadLog. A log that is not there is empty.
   Result<std::string> ReadLog(int64_t id, int64_t* offset, size_t max_bytes, bool* at_end);
+
+  // What the events of an attempt say of accuracy against time; see Service::Curve.
+  std::vector<CurvePoint> ReadCurve(int64_t id, int64_t attempt);
 
   // Errors of removing are not reported: what is left is removed at the next start.
   void Remove(int64_t id);

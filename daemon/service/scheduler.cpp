@@ -44,6 +44,7 @@ Roots RootsOf(const Config& config) {
   Roots roots;
   for (const WatchConfig& watch : config.watch) roots.input.push_back(watch.path);
   roots.input.insert(roots.input.end(), config.input_roots.begin(), config.input_roots.end());
+  roots.input.push_back(UploadFolderOf(config));
   roots.output = config.output_roots;
   roots.output.push_back(config.out);
   return roots;

@@ -56,6 +56,12 @@ struct LogChunk {
   bool complete = false;    // nothing will follow: the job is final and this reaches the end
 };
 
+// How good a job was after so long: one point of accuracy against time.
+struct CurvePoint {
+  double time_s = 0;  // since the attempt began
+  double psnr_db = 0;
+};
+
 // For subscribers. Types: those of StoredEvent, which have an id, and "progress", which is not kept
 // and has id 0.
 using Event = StoredEvent;
@@ -191,6 +197,10 @@ class Service {
   // From `offset` on, at most max_bytes; a negative offset counts from the end. kNotFound: no such
   // job. A job that never ran has an empty log.
   virtual Result<LogChunk> ReadLog(int64_t id, int64_t offset, size_t max_bytes) = 0;
+
+  // Accuracy against time of the last attempt as far as it is, thinned to at most 500 points.
+  // kNotFound: no such job.
+  virtual Result<std::vector<CurvePoint>> Curve(int64_t id) = 0;
 
   // after: the last event id the listener has; absent: only what happens from now on. job: events
   // of that job only; 0: all.

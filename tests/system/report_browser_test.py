@@ -11,18 +11,14 @@ Exits with 77, saying so, where there is no Chromium.
 
 import base64
 import glob
-import json
 import os
-import shutil
-import subprocess
 import sys
 import tempfile
-import time
 
-SKIPPED = 77
+from chromium import SKIPPED, Browser, find_chromium
+
 WIDTHS = (1280, 390)
 SCHEMES = ("light", "dark")
-TIMEOUT_S = 120  # of one answer; a hang is a failure, not a measure of speed
 LOOK = """(() => ({
   overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
   height: document.documentElement.scrollHeight,
@@ -40,70 +36,6 @@ LOOK = """(() => ({
   heading: document.querySelector('h1').textContent,
   background: getComputedStyle(document.body).backgroundColor
 }))()"""
-
-
-class Browser:
-    """Chromium, spoken to over a pair of pipes: JSON messages that end in a zero byte."""
-
-    def __init__(self, program, profile):
-        from_us, self._out = os.pipe()
-        self._in, to_us = os.pipe()
-
-        def pipes():
-            # Away from 3 and 4 first, in case one of them is where the other has to go.
-            reader, writer = os.dup(from_us), os.dup(to_us)
-            os.dup2(reader, 3)
-            os.dup2(writer, 4)
-
-        self._process = subprocess.Popen(
-            [program, "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-gpu",
-             "--disable-background-networking", "--disable-component-update", "--disable-sync",
-             "--disable-dev-shm-usage", "--user-data-dir=" + profile, "--remote-debugging-pipe", "about:blank"],
-            preexec_fn=pipes, pass_fds=(3, 4), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL)
-        os.close(from_us)
-        os.close(to_us)
-        self._buffer = b""
-        self._number = 0
-        self.events = []
-
-    def _message(self):
-        while b"\0" not in self._buffer:
-            chunk = os.read(self._in, 1 << 16)
-            if not chunk:
-                raise RuntimeError("the browser has gone")
-            self._buffer += chunk
-        message, self._buffer = self._buffer.split(b"\0", 1)
-        return json.loads(message)
-
-    def call(self, method, session=None, **parameters):
-        self._number += 1
-        message = {"id": self._number, "method": method, "params": parameters}
-        if session:
-            message["sessionId"] = session
-        os.write(self._out, json.dumps(message).encode() + b"\0")
-        begin = time.monotonic()
-        while time.monotonic() - begin < TIMEOUT_S:
-            answer = self._message()
-            if answer.get("id") == self._number:
-                if "error" in answer:
-                    raise RuntimeError(f"{method}: {answer['error']['message']}")
-                return answer["result"]
-            self.events.append(answer)
-        raise RuntimeError(f"{method}: no answer")
-
-    def wait_for(self, event):
-        while True:
-            for seen in self.events:
-                if seen.get("method") == event:
-                    return
-            self.events.append(self._message())
-
-    def close(self):
-        self._process.kill()
-        self._process.wait()
-        os.close(self._out)
-        os.close(self._in)
 
 
 def complaints(events):
@@ -163,7 +95,7 @@ def main():
     if len(sys.argv) != 2:
         print(__doc__.strip(), file=sys.stderr)
         return 2
-    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    program = find_chromium()
     if not program:
         print("SKIPPED: no Chromium here (apt install chromium): nobody has looked at the report pages")
         return SKIPPED

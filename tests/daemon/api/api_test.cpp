@@ -172,7 +172,7 @@ TEST_F(ApiTest, ChangesJobs) {
 
 TEST_F(ApiTest, KnowsItsPathsAndMethods) {
   for (const char* path :
-       {"", "/", "/v1", "/v1/", "/v1/jobs/", "/v1/jobs/1/", "/v2/jobs", "/v1/jobs/1/cancel/x",
+       {"", "//", "/v1", "/v1/", "/v1/jobs/", "/v1/jobs/1/", "/v2/jobs", "/v1/jobs/1/cancel/x",
         "v1/jobs", "//v1/jobs", "/v1/jobs/0", "/v1/jobs/-1", "/v1/jobs/x", "/v1/jobs/1 ",
         "/v1/jobs/99999999999999999999", "/healthz/"})
     EXPECT_EQ(Get(path).status, 404) << path;

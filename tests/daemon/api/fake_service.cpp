@@ -47,7 +47,7 @@ FakeService::FakeService() {
     job.record.job_json = "{\"version\": 1}";
   }
   jobs[2].record.state = JobState::kRunning;
-  jobs[2].progress = JobProgress{"train", 0.5, 12, 31, 0.25, "on its way"};
+  jobs[2].progress = JobProgress{"train", 0.5, 12, 31, 0, "on its way"};
   jobs[3].record.state = JobState::kFailed;
   jobs[3].record.error_code = "corrupt_data";
   jobs[3].record.error_message = "albedo.png is cut off";
@@ -200,6 +200,12 @@ Result<std::unique_ptr<Subscription>> FakeService::Subscribe(std::optional<int64
 
 Result<OfferOutcome> FakeService::OfferAsset(const AssetOffer&) { return OfferOutcome::kQueued; }
 Status FakeService::WithdrawAsset(const std::string&) { return {}; }
+
+Result<std::vector<CurvePoint>> FakeService::Curve(int64_t id) {
+  const auto job = Get(id);
+  if (!job) return Fail(job.error());
+  return std::vector<CurvePoint>{{1, 20.5}, {2, 24}};
+}
 
 Result<std::vector<AssetView>> FakeService::Assets(const std::string& after_name, int limit) {
   if (failure) return Fail(*failure);

@@ -33,6 +33,7 @@ class FakeService : public Service {
   Status SetPriority(int64_t id, int priority) override;
   Status SetQueuePaused(bool paused) override;
   Result<LogChunk> ReadLog(int64_t id, int64_t offset, size_t max_bytes) override;
+  Result<std::vector<CurvePoint>> Curve(int64_t id) override;
   Result<std::unique_ptr<Subscription>> Subscribe(std::optional<int64_t> after,
                                                   int64_t job) override;
   Result<OfferOutcome> OfferAsset(const AssetOffer& offer) override;
