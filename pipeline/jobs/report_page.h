@@ -18,8 +18,6 @@
 
 namespace patina {
 
-inline constexpr const char* kReportPageName = "report.html";
-
 // What pages of both kinds are made of.
 struct PageFacts {
   const Job& job;
