@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
   std::printf("%s: %s\n", manifest.asset.c_str(), manifest.kind.c_str());
   for (const patina::ManifestPayload& payload : manifest.payloads) {
     std::printf("%s %s %llu\n", payload.name.c_str(), payload.role.c_str(),
-                static_cast<unsigned long long>(payload.size));
+                static_cast<unsigned long long>(payload.bytes));
   }
   return 0;
 }
