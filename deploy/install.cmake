@@ -42,7 +42,7 @@ install(DIRECTORY formats/decoder/ DESTINATION ${CMAKE_INSTALL_DATADIR}/patina/s
   FILES_MATCHING PATTERN "*.core" PATTERN "*.glsl" PATTERN "*.hlsl")
 install(FILES README.md CHANGELOG.md LICENSE formats/FORMATS.md formats/ENGINE.md deploy/RUNBOOK.md
   DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documents)
-install(DIRECTORY deploy/examples deploy/nginx deploy/prometheus DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documents
+install(DIRECTORY deploy/examples deploy/reverse-proxy deploy/prometheus DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documents
   PATTERN "__pycache__" EXCLUDE)
 
 # ---- find_package(patina) ----
