@@ -66,6 +66,9 @@ def ask(program, *arguments):
     return done.stdout
 
 
-def commands_of(patina):
-    """(name, Help) of each command of patina, in the order of its help."""
-    return [(entry.written, Help(ask(patina, "help", entry.written))) for entry in Help(ask(patina, "--help")).commands]
+def read_all(patina, patinad):
+    """The help of both programs: {"patina": text, "patinad": text, "patina COMMAND": text, ...}, commands in their order."""
+    texts = {"patina": ask(patina, "--help"), "patinad": ask(patinad, "--help")}
+    for entry in Help(texts["patina"]).commands:
+        texts["patina " + entry.written] = ask(patina, "help", entry.written)
+    return texts

@@ -3,7 +3,8 @@
 
 usage: make_docs.py --patina FILE --patinad FILE --schema config.schema.json --out FOLDER
 
-Written are patina.1, patinad.8, patinad.json.5 and patina.bash. The same programs give the same bytes.
+Written are patina.1, patinad.8, patinad.json.5, patina.bash, and help.json, the texts that they were made from. The same
+programs give the same bytes.
 """
 
 import argparse
@@ -164,15 +165,16 @@ def main():
     for name in ("patina", "patinad", "schema", "out"):
         parser.add_argument("--" + name, required=True)
     given = parser.parse_args()
-    top = help_text.Help(help_text.ask(given.patina, "--help"))
-    commands = help_text.commands_of(given.patina)
-    patinad = help_text.Help(help_text.ask(given.patinad, "--help"))
+    texts = help_text.read_all(given.patina, given.patinad)
+    top, patinad = help_text.Help(texts["patina"]), help_text.Help(texts["patinad"])
+    commands = [(name.split()[1], help_text.Help(text)) for name, text in texts.items() if " " in name]
     version = help_text.ask(given.patinad, "--version").split()[-1]
     with open(given.schema, encoding="utf-8") as file:
         schema = json.load(file)
     os.makedirs(given.out, exist_ok=True)
     for name, text in (("patina.1", patina_page(top, commands, version)), ("patinad.8", patinad_page(patinad, version)),
-                       ("patinad.json.5", config_page(schema, version)), ("patina.bash", completion(top, commands, patinad))):
+                       ("patinad.json.5", config_page(schema, version)), ("patina.bash", completion(top, commands, patinad)),
+                       ("help.json", json.dumps(texts, indent=1) + "\n")):
         with open(os.path.join(given.out, name), "w", encoding="utf-8") as file:
             file.write(text)
 
