@@ -1,8 +1,5 @@
 # Run by cpack on the installed tree: what Debian's policy wants otherwise than `cmake --install` does.
-set(tree "${CMAKE_CURRENT_BINARY_DIR}")
-if(DEFINED ENV{DESTDIR})
-  set(tree "$ENV{DESTDIR}")
-endif()
+set(tree "${CPACK_TEMPORARY_INSTALL_DIRECTORY}")
 set(share "${tree}${CPACK_PATINA_DEB_PREFIX}/share")
 if(NOT IS_DIRECTORY "${share}/doc/patina")
   message(FATAL_ERROR "finish_tree: there is no installed tree in ${tree}")

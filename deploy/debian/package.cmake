@@ -26,7 +26,7 @@ set(CPACK_PACKAGE_DIRECTORY ${CMAKE_BINARY_DIR}/packages)
 set(CPACK_STRIP_FILES ON)
 # The configuration and the units lie outside the prefix.
 set(CPACK_SET_DESTDIR ON)
-set(CPACK_INSTALL_SCRIPTS ${CMAKE_SOURCE_DIR}/deploy/debian/finish_tree.cmake)
+set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/deploy/debian/finish_tree.cmake)
 set(CPACK_PATINA_DEB_DOCS "${PATINA_DEB_DOCS}")
 set(CPACK_PATINA_DEB_PREFIX ${CMAKE_INSTALL_PREFIX})
 
@@ -36,15 +36,15 @@ set(CPACK_DEBIAN_PACKAGE_MAINTAINER "${PATINA_MAINTAINER}")
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "bakes PBR texture sets and BRDFs into small neural materials")
-set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "bakes PBR texture sets and BRDFs into small neural materials
- Patina takes a folder of PBR maps, a glTF scene or a measured BRDF and trains
- a tiny neural material on CPU cores: four mipmapped BC6H textures, which GPUs
- sample in hardware, and a network of a few hundred weights that fits in a
- shader. The same input gives the same bytes on any number of threads.
- .
- This package has the command patina, the service patinad, which bakes what is
- put into a drop folder, and for renderers the decoder's headers and shaders
- and a static library that reads and writes containers.")
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION
+"Patina takes a folder of PBR maps, a glTF scene or a measured BRDF and trains
+a tiny neural material on CPU cores: four mipmapped BC6H textures, which GPUs
+sample in hardware, and a network of a few hundred weights that fits in a
+shader. The same input gives the same bytes on any number of threads.
+
+This package has the command patina, the service patinad, which bakes what is
+put into a drop folder, and for renderers the decoder's headers and shaders
+and a static library that reads and writes containers.")
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # The maintainer scripts make the account and the folders; both work where no systemd runs.
 set(CPACK_DEBIAN_PACKAGE_DEPENDS
