@@ -44,9 +44,12 @@ def single_pixel(path):
 
 class Library(unittest.TestCase):
     @classmethod
+    def place(cls, name):
+        return os.path.join(cls.folder.name, name)
+
+    @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.TemporaryDirectory()
-        cls.place = lambda name: os.path.join(cls.folder.name, name)
         for component in ("decoder", "formats"):
             run("cmake", "--install", BUILD, "--component", component, "--prefix", cls.place("prefix"))
         run("cmake", "-G", "Ninja", "-S", os.path.join(SOURCE, "deploy", "examples"), "-B", cls.place("build"),
@@ -99,7 +102,7 @@ class Library(unittest.TestCase):
             self.assertEqual(lines[1:], listed)
 
     def test_what_is_wrong_is_said(self):
-        self.assertIn("nothing/manifest.json", self.example("decode", os.path.join(self.folder.name, "nothing"), "0", "0", code=3))
+        self.assertIn("nothing/current/manifest.json", self.example("decode", os.path.join(self.folder.name, "nothing"), "0", "0", code=3))
         sparse = os.path.join(self.folder.name, "baked", "sparse")
         self.assertIn("/kind", self.example("decode", sparse, "0", "0", code=3))
         self.assertIn("list_payloads: error:", self.example("list_payloads", self.folder.name, code=3))
