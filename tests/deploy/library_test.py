@@ -4,6 +4,7 @@
 usage: library_test.py SOURCE PATINA BUILD COMPILER
 """
 
+import glob
 import json
 import os
 import struct
@@ -111,10 +112,11 @@ class Library(unittest.TestCase):
         for wanted, problem in (("99", "version"), ("0.1 COMPONENTS renderer", "renderer")):
             with tempfile.TemporaryDirectory() as folder:
                 with open(os.path.join(folder, "CMakeLists.txt"), "w", encoding="utf-8") as file:
-                    file.write("cmake_minimum_required(VERSION 3.20)\nproject(x LANGUAGES CXX)\n"
+                    file.write("cmake_minimum_required(VERSION 3.20)\nproject(x LANGUAGES NONE)\n"
                                f"find_package(patina {wanted} REQUIRED)\n")
-                said = run("cmake", "-G", "Ninja", "-S", folder, "-B", folder + "/b", "-DCMAKE_PREFIX_PATH=" + self.place("prefix"),
-                           "-DCMAKE_CXX_COMPILER=" + COMPILER, code=1)
+                (config,) = glob.glob(self.place("prefix/lib*/**/patina-config.cmake"), recursive=True)
+                said = run("cmake", "-G", "Ninja", "-S", folder, "-B", folder + "/b", "-Dpatina_DIR=" + os.path.dirname(config),
+                           code=1)
                 self.assertIn(problem, said)
 
 
