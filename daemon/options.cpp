@@ -23,7 +23,7 @@ usage: patinad --watch DIR --out DIR [OPTION...]
   -s, --state DIR        Queue, logs, socket and lock (default: ~/.local/state/patina)
       --failed DIR       Folder for ASSET.failed.json (default: beside the asset)
       --socket PATH      Unix socket of the API (default: patinad.sock in the state folder)
-       --listen ADDR:PORT
+      --listen ADDR:PORT
                           Also serve the API, and a dashboard for browsers, on a loopback address;
                           needs --token-file
       --token-file FILE  The bearer token of TCP clients, in a file of mode 0600
