@@ -1,13 +1,13 @@
 #include "pipeline/tradeoff/decode_time.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
 #include "formats/container.h"
 #include "formats/decoder/patina_decoder.h"
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/base/rng.h"
 #include "pipeline/jobs/decoder_status.h"
 #include "pipeline/jobs/measure_brdf.h"
@@ -15,18 +15,16 @@
 namespace patina {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr double kSecondsARound = 0.05;
 
 // Times `decode` (which returns how many it decoded) for a round.
 template <class Decode>
 double NsEach(Decode decode) {
-  const Clock::time_point start = Clock::now();
+  const double start = ThreadCpuSeconds();
   double seconds = 0, count = 0;
   while (seconds < kSecondsARound) {
     count += decode();
-    seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    seconds = ThreadCpuSeconds() - start;
   }
   return 1e9 * seconds / count;
 }

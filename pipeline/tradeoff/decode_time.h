@@ -17,7 +17,7 @@ class DecodeTimer {
   static Result<std::unique_ptr<DecodeTimer>> Open(const std::string& container);
   virtual ~DecodeTimer() = default;
 
-  // Decodes for about 50 milliseconds.
+  // Decodes for about 50 milliseconds of this thread's CPU time, which is what is measured.
   virtual void Round() = 0;
   // Nanoseconds of a texel with all its channels (material: rows of mip 0 or the finest stored mip,
   // reference decoder), or of a pair of directions (BRDF: batches, SIMD kernels); the median of the

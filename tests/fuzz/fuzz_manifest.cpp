@@ -48,7 +48,7 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
   manifest.quality.maps = {{"albedo", {30.5, 0.5, 0.25, 1.5}, {{30.5, {}, {}, {}}}}};
   manifest.quality.gate_min_psnr_db = 10;
   manifest.training.stopped_by = "budget";
-  manifest.training.curve = {{10, 1.5, 2.5}};
+  manifest.training.curve = {{10, 1.5, 2.5, {{"albedo", 1.5}}}};
   manifest.effects = {{"a", "constant", "c", ManifestSavings{1, 2, 3, 4}}};
   manifest.warnings = {"w"};
   const std::string text = ToJson(manifest).value();
