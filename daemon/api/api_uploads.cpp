@@ -1,8 +1,8 @@
 // The handlers of uploads.
 #include "daemon/api/api_json.h"
+#include "daemon/api/upload_plan.h"
 #include "daemon/api/api_parts.h"
 #include "daemon/api/submit_body.h"
-#include "pipeline/jobs/job_plan.h"
 
 namespace patina::daemon {
 namespace {
@@ -62,25 +62,21 @@ HttpResponse Api::SubmitUpload(const Call& call) {
   std::vector<UploadedJob> made;
   std::vector<int64_t> jobs;
   std::optional<Error> stopped;  // by what is not the files' fault
-  for (const PlannedJob& planned : PlanJobs(*folder, "").jobs) {
+  for (Job& planned : PlanUpload(*folder)) {
     UploadedJob entry;
     entry.asset = planned.asset;
-    if (!planned.job) {
-      entry.problem = planned.job.error().message;
+    SubmitRequest request;
+    request.job = std::move(planned);
+    request.job.quality = parsed.quality;
+    request.priority = parsed.priority;
+    request.force = parsed.force;
+    const auto submitted = service_->Submit(request);
+    if (submitted) {
+      entry.job = submitted->id;
+      jobs.push_back(submitted->id);
     } else {
-      SubmitRequest request;
-      request.job = *planned.job;
-      request.job.quality = parsed.quality;
-      request.priority = parsed.priority;
-      request.force = parsed.force;
-      const auto submitted = service_->Submit(request);
-      if (submitted) {
-        entry.job = submitted->id;
-        jobs.push_back(submitted->id);
-      } else {
-        entry.problem = submitted.error().message;
-        if (submitted.error().code != ErrorCode::kInvalidArgument) stopped = submitted.error();
-      }
+      entry.problem = submitted.error().message;
+      if (submitted.error().code != ErrorCode::kInvalidArgument) stopped = submitted.error();
     }
     made.push_back(std::move(entry));
   }

@@ -113,7 +113,7 @@ class ReportPage(unittest.TestCase):
         for name in images:
             shutil.copyfile(os.path.join(self.maps, name), os.path.join(folder, name))
         shutil.copyfile(os.path.join(folder, images[0]), os.path.join(folder, HOSTILE))
-        result = bake(self, folder, "--out", self.out, "--time-budget", "60", "--target-psnr", "90",
+        result = bake(self, folder, "--out", self.out, "--time-budget", "60", "--target-psnr", "20",
                       "--min-psnr", "5")
         page = os.path.join(result["container"], "report.html")
         root = self.check(page)
