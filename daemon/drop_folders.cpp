@@ -122,7 +122,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
     OfferScenes(root, asset.path, offer, &claimed, &offers);
     offer.job.folder = asset.path;
     if (!offers.empty() || !claimed.empty()) {
-      auto unclaimed = UnclaimedSets(asset.path, claimed);
+      auto unclaimed = FindSetNames(asset.path, claimed);
       if (!unclaimed) return offers;  // images that are no sets are the scene's
       OfferSets(asset, *unclaimed, offer, &offers);
       return offers;
@@ -163,23 +163,6 @@ class WatchedFolders : public DropFolders, public AssetSource {
       }
       if (above == root || above.size() <= root.size()) return;
     }
-  }
-
-  // The sets of a folder none of whose files belongs to a scene.
-  static Result<std::vector<std::string>> UnclaimedSets(const std::string& folder,
-                                                        const std::set<std::string>& claimed) {
-    PATINA_ASSIGN(const GroupedMaps grouped, GroupMaps(folder));
-    std::vector<std::string> sets;
-    std::error_code ignored;
-    const auto is_claimed = [&](const MapCandidate* candidate) {
-      return claimed.count(std::filesystem::weakly_canonical(candidate->path, ignored).string()) !=
-             0;
-    };
-    for (const MapGroup& group : grouped.groups) {
-      if (std::none_of(group.own.begin(), group.own.end(), is_claimed))
-        sets.push_back(group.set_name);
-    }
-    return sets;
   }
 
   // Each set of a folder, named after folder and set.

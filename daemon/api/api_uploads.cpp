@@ -1,8 +1,8 @@
 // The handlers of uploads.
 #include "daemon/api/api_json.h"
-#include "daemon/api/upload_plan.h"
 #include "daemon/api/api_parts.h"
 #include "daemon/api/submit_body.h"
+#include "daemon/api/upload_plan.h"
 
 namespace patina::daemon {
 namespace {

@@ -271,9 +271,21 @@ class FolderGrouper {
 Result<GroupedMaps> GroupMaps(const std::string& folder) { return FolderGrouper(folder).Run(); }
 
 Result<std::vector<std::string>> FindSetNames(const std::string& folder) {
+  return FindSetNames(folder, {});
+}
+
+Result<std::vector<std::string>> FindSetNames(const std::string& folder,
+                                              const std::set<std::string>& claimed) {
   PATINA_ASSIGN(const GroupedMaps grouped, GroupMaps(folder));
   std::vector<std::string> names;
-  for (const MapGroup& group : grouped.groups) names.push_back(group.set_name);
+  std::error_code ignored;
+  const auto is_claimed = [&](const MapCandidate* candidate) {
+    return claimed.count(std::filesystem::weakly_canonical(candidate->path, ignored).string()) != 0;
+  };
+  for (const MapGroup& group : grouped.groups) {
+    if (claimed.empty() || std::none_of(group.own.begin(), group.own.end(), is_claimed))
+      names.push_back(group.set_name);
+  }
   return names;
 }
 

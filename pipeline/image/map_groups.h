@@ -2,6 +2,7 @@
 // ask that must not touch images.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -46,5 +47,9 @@ Result<GroupedMaps> GroupMaps(const std::string& folder);
 // The names of the materials of a folder, as FindMaps gives them and Job::set takes them. What the
 // files hold can still make each of them an error. Errors: those of GroupMaps.
 Result<std::vector<std::string>> FindSetNames(const std::string& folder);
+// The same without materials of which a file is in `claimed`: canonical paths, such as those of the
+// textures of scenes.
+Result<std::vector<std::string>> FindSetNames(const std::string& folder,
+                                              const std::set<std::string>& claimed);
 
 }  // namespace patina
