@@ -2,6 +2,7 @@
 import {ApiError, get, openFile, part, post, text} from "./api.js";
 import {announce, bytes, decibels, duration, facts, failure, h, isFinal, moment, progressBar, progressText, refresh, replace, stateMark, stateName} from "./dom.js";
 import {accuracyPlot} from "./plot.js";
+import {reloader} from "./reload.js";
 
 const LOG_BYTES = 65536;
 
@@ -26,15 +27,14 @@ export function jobView(parameters, argument) {
     h("section", {"aria-labelledby": "curve-title"}, h("h2", {id: "curve-title"}, "Accuracy against time"), plot),
     h("section", {"aria-labelledby": "log-title"}, h("h2", {id: "log-title"}, "Log"), log), detail);
   let job = null;
-  let closed = false;
   let offset = -LOG_BYTES;
-  let timer = 0, busy = false, again = false, curveAt = 0, stage = "";
+  let curveAt = 0, stage = "";
 
   async function act(action, said) {
     try {
       await post(`/v1/jobs/${id}/${action}`);
       announce(said);
-      await load();
+      await loader.now();
     } catch (error) {
       replace(trouble, failure(error));
     }
@@ -82,7 +82,7 @@ export function jobView(parameters, argument) {
   async function loadCurve() {
     curveAt = Date.now();
     const {points} = await get(`/v1/jobs/${id}/curve`);
-    if (closed) return;
+    if (loader.isClosed()) return;
     if (points.length === 0) {
       replace(plot, h("p", {class: "quiet"}, job.state === "running" ? "The first figures come with the training." : "Nothing was learned."));
     } else {
@@ -91,7 +91,7 @@ export function jobView(parameters, argument) {
   }
 
   async function loadLog() {
-    for (let pieces = 0; pieces < 16 && !closed; ++pieces) {
+    for (let pieces = 0; pieces < 16 && !loader.isClosed(); ++pieces) {
       const chunk = await text(`/v1/jobs/${id}/log?offset=${offset}&limit=${LOG_BYTES}`);
       const follows = log.scrollTop + log.clientHeight >= log.scrollHeight - 8;
       offset = chunk.next;
@@ -105,43 +105,25 @@ export function jobView(parameters, argument) {
     }
   }
 
-  async function load() {
-    if (busy) {
-      again = true;
-      return;
-    }
-    busy = true;
-    try {
-      const before = job && job.state;
-      job = await get(`/v1/jobs/${id}`);
-      if (closed) return;
-      replace(trouble);
-      showHead();
-      if (before && before !== job.state) announce(`${job.asset}: ${stateName(job.state)}`);
-      await Promise.all([loadCurve(), loadLog()]);
-    } catch (error) {
-      if (!closed) replace(trouble, failure(error instanceof ApiError && error.status === 404
-        ? new Error("There is no such job: it ended long ago and was removed, or never was.") : error));
-    } finally {
-      busy = false;
-      if (again && !closed) {
-        again = false;
-        schedule();
-      }
-    }
-  }
-  function schedule() {
-    if (timer === 0) timer = setTimeout(() => { timer = 0; load(); }, 500);
-  }
-  const ready = load();
+  const loader = reloader(async () => {
+    const before = job && job.state;
+    job = await get(`/v1/jobs/${id}`);
+    if (loader.isClosed()) return;
+    replace(trouble);
+    showHead();
+    if (before && before !== job.state) announce(`${job.asset}: ${stateName(job.state)}`);
+    await Promise.all([loadCurve(), loadLog()]);
+  }, error => replace(trouble, failure(error instanceof ApiError && error.status === 404
+    ? new Error("There is no such job: it ended long ago and was removed, or never was.") : error)));
+  const ready = loader.now();
 
   return {
     element, ready, title: `Job ${id}`, page: "queue",
     event(event) {
-      if (event.type === "reset") schedule();
+      if (event.type === "reset") loader.soon();
       if (String(event.job) !== id || !job) return;
       if (event.type !== "progress") {
-        schedule();
+        loader.soon();
         return;
       }
       job.progress = event.data;
@@ -149,12 +131,9 @@ export function jobView(parameters, argument) {
         stage = event.data.stage;
         announce(`${job.asset}: ${progressText(event.data)}`);
       }
-      if (job.state !== "running" || Date.now() - curveAt > 2000) schedule();
+      if (job.state !== "running" || Date.now() - curveAt > 2000) loader.soon();
       else showHead();
     },
-    close() {
-      closed = true;
-      clearTimeout(timer);
-    }
+    close: loader.close
   };
 }

@@ -1,6 +1,7 @@
 // The queue: what runs now, what waits and why, what has ended; and where files are dropped.
 import {get, part, post} from "./api.js";
 import {announce, brief, count, duration, failure, facts, h, isFinal, moment, progressBar, progressText, refresh, replace, stateMark, table} from "./dom.js";
+import {reloader} from "./reload.js";
 import {uploadPanel} from "./upload.js";
 
 const PAGE = 25;
@@ -61,10 +62,6 @@ export function queueView(parameters) {
     h("section", {"aria-labelledby": "jobs-title"}, h("h2", {id: "jobs-title"}, "Jobs"), filters, list));
   let cards = new Map();
   let paused = false;
-  let timer = 0;
-  let busy = false;
-  let again = false;
-  let closed = false;
 
   const link = (toState, toCursors) => {
     const query = new URLSearchParams();
@@ -78,7 +75,7 @@ export function queueView(parameters) {
     try {
       await post(path);
       announce(said);
-      await load();
+      await loader.now();
     } catch (error) {
       replace(trouble, failure(error));
     }
@@ -136,36 +133,17 @@ export function queueView(parameters) {
         page.next_cursor && h("a", {href: link(state, [...cursors, page.next_cursor]), "data-key": "older"}, "Older")));
   }
 
-  // One at a time; what is asked for meanwhile is one more.
-  async function load() {
-    if (busy) {
-      again = true;
-      return;
-    }
-    busy = true;
-    try {
-      const before = cursors.length > 0 ? `&cursor=${part(cursors[cursors.length - 1])}` : "";
-      const [status, atWork, page] = await Promise.all([get("/v1/status"), get(`/v1/jobs?state=running&limit=${MOST_RUNNING}`),
-        get(`/v1/jobs?limit=${PAGE}${state ? `&state=${part(state)}` : ""}${before}`)]);
-      if (closed) return;
-      replace(trouble);
-      showStatus(status);
-      showRunning(atWork.jobs, status.jobs.running || 0);
-      showJobs(page);
-    } catch (error) {
-      if (!closed) replace(trouble, failure(error));
-    } finally {
-      busy = false;
-      if (again && !closed) {
-        again = false;
-        schedule();
-      }
-    }
-  }
-  function schedule() {
-    if (timer === 0) timer = setTimeout(() => { timer = 0; load(); }, 500);
-  }
-  const ready = load();
+  const loader = reloader(async () => {
+    const before = cursors.length > 0 ? `&cursor=${part(cursors[cursors.length - 1])}` : "";
+    const [status, atWork, page] = await Promise.all([get("/v1/status"), get(`/v1/jobs?state=running&limit=${MOST_RUNNING}`),
+      get(`/v1/jobs?limit=${PAGE}${state ? `&state=${part(state)}` : ""}${before}`)]);
+    if (loader.isClosed()) return;
+    replace(trouble);
+    showStatus(status);
+    showRunning(atWork.jobs, status.jobs.running || 0);
+    showJobs(page);
+  }, error => replace(trouble, failure(error)));
+  const ready = loader.now();
 
   return {
     element, ready, title: "Queue", page: "queue",
@@ -174,13 +152,10 @@ export function queueView(parameters) {
         const shown = cards.get(event.job);
         if (shown) shown.show(event.data);
       } else {
-        schedule();
+        loader.soon();
       }
     },
     drop: panel.drop,
-    close() {
-      closed = true;
-      clearTimeout(timer);
-    }
+    close: loader.close
   };
 }
