@@ -268,13 +268,13 @@ Result<std::vector<ArchiveMember>> UnpackArchive(
   uint64_t total = 0;
   for (uint32_t i = 0; i < archive.count(); ++i) {
     PATINA_ASSIGN(const ArchiveMember member, archive.Next());
-    total += member.content_bytes;
-    if (total > max_bytes) {
+    if (member.content_bytes > max_bytes - total) {
       return Fail(ErrorCode::kOutOfRange,
                   QuoteForMessage(member.name) + " of " + std::to_string(member.content_bytes) +
                       " bytes makes more than the " + std::to_string(max_bytes) +
                       " bytes that may be unpacked; --max-bytes allows more");
     }
+    total += member.content_bytes;
     if ((i == 0) != (member.name == kManifestName) ||
         (i == 0 && member.content_bytes > kMaxManifestBytes)) {
       return Fail(ErrorCode::kCorruptData, "bad member " + QuoteForMessage(member.name) +

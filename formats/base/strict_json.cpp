@@ -1,5 +1,6 @@
 #include "formats/base/strict_json.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 #include <vector>
@@ -53,6 +54,18 @@ std::string EscapePointer(std::string_view key) {
     }
   }
   return out;
+}
+
+std::string UnknownMember(const nlohmann::json& object, const std::string& pointer,
+                          std::initializer_list<std::string_view> keys) {
+  if (!object.is_object()) return "";
+  for (const auto& [key, value] : object.items()) {
+    if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
+    std::string known;
+    for (const std::string_view k : keys) known += (known.empty() ? "" : ", ") + std::string(k);
+    return pointer + "/" + EscapePointer(key) + ": is not a field here; fields: " + known;
+  }
+  return "";
 }
 
 }  // namespace patina

@@ -129,7 +129,7 @@ class Reader {
   explicit Reader(const Json& json) : json_(json), view_(&json, &problem_) {}
 
   Result<Stack> Run() {
-    KnowKeys(json_, "", {"version", "layers", "base"});
+    Complain(UnknownMember(json_, "", {"version", "layers", "base"}));
     const int version = view_.Field("version").Int(1, 1 << 20);
     if (problem_.text.empty() && version != kFileVersion) {
       Complain("/version: " + std::to_string(version) +
@@ -157,17 +157,6 @@ class Reader {
  private:
   void Complain(const std::string& text) {
     if (problem_.text.empty()) problem_.text = text;
-  }
-
-  void KnowKeys(const Json& object, const std::string& pointer,
-                std::initializer_list<std::string_view> keys) {
-    if (!object.is_object()) return;
-    for (const auto& [key, value] : object.items()) {
-      if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
-      std::string known;
-      for (const std::string_view k : keys) known += (known.empty() ? "" : ", ") + std::string(k);
-      Complain(pointer + "/" + EscapePointer(key) + ": is not a field here; fields: " + known);
-    }
   }
 
   // One number for all channels, or three.
@@ -203,9 +192,9 @@ class Reader {
 
   void ReadLayer(const JsonView& object, const Json& json, const std::string& at) {
     at_ = at;
-    KnowKeys(
-        json, at,
-        {"ior", "roughness", "rotation_deg", "thickness", "absorption", "scattering", "asymmetry"});
+    Complain(UnknownMember(json, at,
+                           {"ior", "roughness", "rotation_deg", "thickness", "absorption",
+                            "scattering", "asymmetry"}));
     Layer layer;
     layer.ior = object.Field("ior").Number();
     ReadRoughness(object, json, &layer.roughness);
@@ -219,9 +208,9 @@ class Reader {
   void ReadBase(const JsonView& base, const Json& json) {
     const std::string kind = base.Field("kind").String(64);
     if (!problem_.text.empty()) return;
-    if (kind == "black") return KnowKeys(json, "/base", {"kind"});
+    if (kind == "black") return Complain(UnknownMember(json, "/base", {"kind"}));
     if (kind != "mixture") return ReadPart(base, json, "/base", false);
-    KnowKeys(json, "/base", {"kind", "parts"});
+    Complain(UnknownMember(json, "/base", {"kind", "parts"}));
     size_t p = 0;
     base.Field("parts").ForEach(kMaxParts, [&](const JsonView& part) {
       const std::string at = "/base/parts/" + std::to_string(p);
@@ -238,18 +227,20 @@ class Reader {
     if (mixed) part.weight = object.Field("weight").Number();
     if (kind == "diffuse") {
       if (mixed) {
-        KnowKeys(json, at, {"kind", "weight", "albedo"});
+        Complain(UnknownMember(json, at, {"kind", "weight", "albedo"}));
       } else {
-        KnowKeys(json, at, {"kind", "albedo"});
+        Complain(UnknownMember(json, at, {"kind", "albedo"}));
       }
       object.Field("albedo");
       ReadRgb(object, json, "albedo", &part.albedo);
     } else if (kind == "conductor") {
       part.kind = BaseKind::kConductor;
       if (mixed) {
-        KnowKeys(json, at, {"kind", "weight", "metal", "eta", "k", "roughness", "rotation_deg"});
+        Complain(UnknownMember(
+            json, at, {"kind", "weight", "metal", "eta", "k", "roughness", "rotation_deg"}));
       } else {
-        KnowKeys(json, at, {"kind", "metal", "eta", "k", "roughness", "rotation_deg"});
+        Complain(
+            UnknownMember(json, at, {"kind", "metal", "eta", "k", "roughness", "rotation_deg"}));
       }
       ReadMetal(object, json, at, &part);
       ReadRoughness(object, json, &part.roughness);

@@ -29,9 +29,9 @@ class MaterialReader {
   }
 
   SceneMaterial Run() {
-    KnowKeys(json_, "",
-             {"name", "maps", "constants", "uses", "alpha_mode", "alpha_cutoff", "double_sided",
-              "unlit", "address", "lod_range", "texel_density"});
+    Complain(UnknownMember(json_, "",
+                           {"name", "maps", "constants", "uses", "alpha_mode", "alpha_cutoff",
+                            "double_sided", "unlit", "address", "lod_range", "texel_density"}));
     material_.look.material = view_.Field("name").String(255);
     if (view_ && material_.look.material.empty()) Complain("/name: is empty");
     if (const JsonView maps = view_.Optional("maps")) {
@@ -65,17 +65,6 @@ class MaterialReader {
     if (problem_.text.empty()) problem_.text = text;
   }
 
-  void KnowKeys(const Json& object, const std::string& pointer,
-                std::initializer_list<std::string_view> keys) {
-    if (!object.is_object()) return;
-    for (const auto& [key, value] : object.items()) {
-      if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
-      std::string known;
-      for (const std::string_view k : keys) known += (known.empty() ? "" : ", ") + std::string(k);
-      Complain(pointer + "/" + EscapePointer(key) + ": is not a field here; fields: " + known);
-    }
-  }
-
   std::string Choice(const JsonView& object, const char* key,
                      std::initializer_list<const char*> choices, const std::string& pointer = "") {
     const JsonView value = object.Optional(key);
@@ -91,7 +80,8 @@ class MaterialReader {
   }
 
   void ReadMap(const JsonView& view, const Json& json, const std::string& at) {
-    KnowKeys(json, at, {"role", "file", "channels", "color_space", "convention", "invert"});
+    Complain(UnknownMember(json, at,
+                           {"role", "file", "channels", "color_space", "convention", "invert"}));
     SceneMap map;
     map.role = view.Field("role").String(64);
     const std::string file = view.Field("file").String();
@@ -197,7 +187,8 @@ class MaterialReader {
       material_.lod_range = {mips[0], mips[1]};
     }
     if (density) {
-      KnowKeys(json_["texel_density"], "/texel_density", {"uv_size_m", "pixels_per_m"});
+      Complain(
+          UnknownMember(json_["texel_density"], "/texel_density", {"uv_size_m", "pixels_per_m"}));
       TexelDensity read;
       read.uv_size_m = density.Field("uv_size_m").Number();
       std::vector<double> pixels;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "formats/base/names.h"
+#include "pipeline/report/html.h"
 
 namespace patina::validate {
 namespace {
@@ -34,29 +35,6 @@ std::string Printable(std::string_view text) {
   std::string printable(text);
   for (char& c : printable) c = static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? '?' : c;
   return printable;
-}
-
-std::string Xml(std::string_view text) {
-  std::string escaped;
-  for (const char c : Printable(text)) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
 }
 
 // A path as a relative URI reference (RFC 3986).
@@ -167,11 +145,11 @@ std::string ReportJunit(const ValidationReport& report) {
                              CodeText(finding.number) + " " + PlaceText(finding) + ": " +
                              finding.message;
     if (finding.severity < report.fail_on) {
-      test.below += Xml(line) + "\n";
+      test.below += EscapeHtml(line) + "\n";
       continue;
     }
     if (test.failure.empty()) test.first = line;
-    test.failure += Xml(line) + "\n" + Xml(KindOf(finding.number).remedy) + "\n";
+    test.failure += EscapeHtml(line) + "\n" + EscapeHtml(KindOf(finding.number).remedy) + "\n";
     test.unreadable = test.unreadable || finding.number >= 9000;
   }
   size_t failures = 0, errors = 0;
@@ -179,7 +157,7 @@ std::string ReportJunit(const ValidationReport& report) {
   for (size_t i = 0; i < cases.size(); ++i) {
     const Case& test = cases[i];
     body += "    <testcase classname=\"patina." + std::string(KindName(report.targets[i])) +
-            "\" name=\"" + Xml(report.targets[i].label) + "\"";
+            "\" name=\"" + EscapeHtml(report.targets[i].label) + "\"";
     if (test.failure.empty() && test.below.empty()) {
       body += "/>\n";
       continue;
@@ -188,7 +166,7 @@ std::string ReportJunit(const ValidationReport& report) {
     if (!test.failure.empty()) {
       ++(test.unreadable ? errors : failures);
       const std::string element = test.unreadable ? "error" : "failure";
-      body += "      <" + element + " message=\"" + Xml(test.first) + "\">" + test.failure + "</" +
+      body += "      <" + element + " message=\"" + EscapeHtml(test.first) + "\">" + test.failure + "</" +
               element + ">\n";
     }
     if (!test.below.empty()) body += "      <system-out>" + test.below + "</system-out>\n";
