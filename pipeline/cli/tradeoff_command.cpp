@@ -2,6 +2,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "formats/base/file_io.h"
 #include "pipeline/cli/commands.h"
@@ -89,11 +90,18 @@ void PrintMeans(const std::vector<SweepRow>& means) {
 int TradeoffCommand(const CommandLine& line, const CancelToken& cancel) {
   const TradeoffOptions& options = line.tradeoff;
   std::vector<Job> materials, brdfs;
+  std::set<std::string> taken;
   int worst = kExitDone;
   for (const std::string& input : options.inputs) {
     for (PlannedJob& planned : PlanJobs(input, options.out).jobs) {
       if (!planned.job) {
         PrintError(planned.asset + ": " + planned.job.error().message);
+        worst = kExitBadInput;
+        continue;
+      }
+      if (!taken.insert(planned.asset).second) {
+        PrintError(planned.asset + ": another input is also named so; rename one, or sweep it into "
+                                   "another --out");
         worst = kExitBadInput;
         continue;
       }

@@ -94,7 +94,10 @@ Status RunShared(std::span<const Job> jobs, const Variant& variant, const std::s
   Cost each{-1, -1};
   if (const auto text = ReadTextFile(record, kMaxRecordBytes)) {
     const Json json = Json::parse(*text, nullptr, false);
-    if (json.is_object() && json.value("key", "") == key)
+    const bool whole = std::all_of(jobs.begin(), jobs.end(), [&folder](const Job& job) {
+      return OpenContainer(folder + "/" + job.asset).has_value();
+    });
+    if (whole && json.is_object() && json.value("key", "") == key)
       each = {json.value("seconds", -1.0), json.value("cpu_seconds", -1.0)};
   }
   std::map<std::string, std::string> problems;
@@ -171,21 +174,24 @@ std::vector<SweepRow> Sweep(std::span<const Job> jobs, std::span<const Variant> 
 }
 
 Status MeasureDecoding(std::vector<SweepRow>* rows, const CancelToken& cancel) {
-  std::vector<std::unique_ptr<DecodeTimer>> timers;
-  std::vector<SweepRow*> timed;
+  std::map<std::string, std::vector<SweepRow*>> of_asset;
   for (SweepRow& row : *rows) {
-    if (!row.problem.empty()) continue;
-    PATINA_ASSIGN(std::unique_ptr<DecodeTimer> timer, DecodeTimer::Open(row.container));
-    timers.push_back(std::move(timer));
-    timed.push_back(&row);
+    if (row.problem.empty()) of_asset[row.asset].push_back(&row);
   }
-  for (int round = 0; round < DecodeTimer::kRounds; ++round) {
-    for (const auto& timer : timers) {
-      if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
-      timer->Round();
+  for (const auto& [asset, timed] : of_asset) {
+    std::vector<std::unique_ptr<DecodeTimer>> timers;
+    for (const SweepRow* row : timed) {
+      PATINA_ASSIGN(std::unique_ptr<DecodeTimer> timer, DecodeTimer::Open(row->container));
+      timers.push_back(std::move(timer));
     }
+    for (int round = 0; round < DecodeTimer::kRounds; ++round) {
+      for (const auto& timer : timers) {
+        if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
+        timer->Round();
+      }
+    }
+    for (size_t i = 0; i < timed.size(); ++i) timed[i]->decode_ns = timers[i]->MedianNs();
   }
-  for (size_t i = 0; i < timed.size(); ++i) timed[i]->decode_ns = timers[i]->MedianNs();
   return {};
 }
 

@@ -41,7 +41,8 @@ std::vector<SweepRow> Sweep(std::span<const Job> jobs, std::span<const Variant> 
                             const std::function<JobObserver&(const std::string& label)>& observer,
                             const CancelToken& cancel);
 
-// Sets decode_ns of all rows that have a container: in turns, so that all see the same machine.
+// Sets decode_ns of all rows that have a container. The variants of an input take turns, so that all
+// see the same machine; one input's decoders are in memory at a time.
 Status MeasureDecoding(std::vector<SweepRow>* rows, const CancelToken& cancel);
 
 // The mean of each variant that all inputs of its kind were baked with, in the order of the

@@ -69,7 +69,11 @@ SweepAxes DefaultMaterialAxes() {
 }
 
 void Variant::ApplyTo(Job* job) const {
+  // A sweep shows what each variant gives: nothing that a job file asks for ends it early or keeps
+  // it from being counted.
   job->choose_profile = false;
+  job->target_psnr_db = job->target_bpp = job->time_budget_s = job->min_psnr_db = 0;
+  job->size_budget_bytes = 0;
   if (profile) job->profile = *profile;
   if (quality) job->quality = *quality;
   if (recipe) job->recipe = *recipe;

@@ -35,6 +35,7 @@ struct Variant {
   JobModel model;
   int share = 1;
 
+  // Also takes back targets, budgets and gates.
   void ApplyTo(Job* job) const;
 };
 

@@ -55,6 +55,14 @@ TEST(Tradeoff, SaysWhatCannotBeSwept) {
   EXPECT_EQ(empty.exit_code, 3);
   EXPECT_THAT(empty.err, HasSubstr("floor"));
   EXPECT_EQ(Patina({"tradeoff", folder / "floor"}).exit_code, 2);
+  ASSERT_EQ(Patina({"sample", "--out", folder / "a/floor", "--kind", "material", "--size", "16", "-q"})
+                .exit_code,
+            0);
+  fs::copy(folder / "a", folder / "b", fs::copy_options::recursive);
+  const Outcome twice = Patina({"tradeoff", folder / "a/floor", folder / "b/floor", "--out",
+                                folder / "sweep", "--qualities", "preview", "--profiles", "bcf-1k"});
+  EXPECT_EQ(twice.exit_code, 3);
+  EXPECT_THAT(twice.err, HasSubstr("floor: another input is also named so"));
   EXPECT_EQ(Sweep(folder, {"--profiles", "bcf-9k"}).exit_code, 2);
 }
 

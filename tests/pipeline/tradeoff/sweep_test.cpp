@@ -36,7 +36,11 @@ TEST(Variants, AreTheProductOfTheAxesOfTheirKind) {
   EXPECT_EQ(materials[1].name, "profile-bcf-0.5k_quality-standard");
   Job job;
   job.choose_profile = true;
+  job.target_psnr_db = job.min_psnr_db = job.time_budget_s = job.target_bpp = 40;
+  job.size_budget_bytes = 40;
   materials[5].ApplyTo(&job);
+  EXPECT_EQ(job.target_psnr_db + job.min_psnr_db + job.time_budget_s + job.target_bpp, 0);
+  EXPECT_EQ(job.size_budget_bytes, 0u);
   EXPECT_EQ(job.profile, Profile::kBcf2k);
   EXPECT_EQ(job.quality, Quality::kReference);
   EXPECT_FALSE(job.choose_profile);
