@@ -164,6 +164,20 @@ std::string ContainerText(const Container& container) {
   if (m.quality.ssim) text += Format(", SSIM %.4f", *m.quality.ssim);
   if (m.quality.flip) text += Format(", FLIP %.4f", *m.quality.flip);
   text += "\n";
+  if (m.training.choice) {
+    const ManifestChoice& choice = *m.training.choice;
+    text += Format("  asked for:%s%s: %s; ",
+                   choice.target_psnr_db > 0
+                       ? Format(" %.2f dB of mip 0", choice.target_psnr_db).c_str()
+                       : "",
+                   choice.most_bytes > 0
+                       ? Format(" at most %llu bytes",
+                                static_cast<unsigned long long>(choice.most_bytes))
+                             .c_str()
+                       : "",
+                   choice.met ? "met" : "missed") +
+            choice.reason + "\n";
+  }
   if (m.quality.gate_min_psnr_db) {
     text += Format("  quality gate %.2f dB: %s\n", *m.quality.gate_min_psnr_db,
                    m.quality.gate_met ? "met" : "missed");

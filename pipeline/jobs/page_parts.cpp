@@ -1,7 +1,6 @@
 #include "pipeline/jobs/page_parts.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "formats/base/file_io.h"
 #include "formats/base/zstd_frame.h"
@@ -15,25 +14,6 @@ namespace {
 
 constexpr const char* kMiddleDot = " \xC2\xB7 ";
 constexpr const char* kTimes = "\xC3\x97";
-
-// A scalar of the manifest as text; empty for what is none.
-std::string ScalarText(const nlohmann::json& value) {
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  if (value.is_number_integer()) return value.dump();
-  if (value.is_number()) return ShortText(value.get<double>(), 6);
-  return "";
-}
-
-void AddFactList(const std::vector<std::pair<std::string, std::string>>& facts,
-                 const std::string& caption, Html* html) {
-  Table table;
-  table.caption = caption;
-  table.heads = {"what", "value"};
-  table.numbers = false;
-  for (const auto& [name, value] : facts) table.rows.push_back({name, {{value}}});
-  AddTable(table, html);
-}
 
 }  // namespace
 
@@ -165,21 +145,13 @@ void AddBytesSection(const PageFacts& facts, const std::vector<TextureBytes>& pe
   html->Close();
 }
 
-void AddTrainingFacts(const PageFacts& facts,
-                      const std::vector<std::pair<std::string, std::string>>& known, Html* html) {
-  std::vector<std::pair<std::string, std::string>> rows = known;
-  const auto text = ToJson(facts.manifest);
-  const nlohmann::json manifest =
-      text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
-  if (manifest.is_object() && manifest.contains("training")) {
-    const nlohmann::json& training = manifest["training"];
-    for (const auto& [name, value] : training.items()) {
-      if (name == "samples" || name == "stopped_by" || name == "rollbacks") continue;
-      const std::string scalar = ScalarText(value);
-      if (!scalar.empty()) rows.emplace_back(Spaced(name), scalar);
-    }
-  }
-  AddFactList(rows, "The training", html);
+void AddTrainingFacts(const std::vector<std::pair<std::string, std::string>>& facts, Html* html) {
+  Table table;
+  table.caption = "The training";
+  table.heads = {"what", "value"};
+  table.numbers = false;
+  for (const auto& [name, value] : facts) table.rows.push_back({name, {{value}}});
+  AddTable(table, html);
 }
 
 std::string FinishReportPage(const PageFacts& facts, Html html) {

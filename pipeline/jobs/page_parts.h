@@ -31,10 +31,8 @@ void AddTrio(const PageTrio& trio, const std::string& caption, bool texels, Html
 void AddBytesSection(const PageFacts& facts, const std::vector<TextureBytes>& peers,
                      const std::string& how_counted, Html* html);
 
-// What the manifest says of the training, members that this program does not know included, after
-// `known`.
-void AddTrainingFacts(const PageFacts& facts,
-                      const std::vector<std::pair<std::string, std::string>>& known, Html* html);
+// Names and values of the training.
+void AddTrainingFacts(const std::vector<std::pair<std::string, std::string>>& facts, Html* html);
 
 std::string Spaced(std::string name);                 // "mean_mips" as "mean mips"
 std::string StopText(const std::string& stopped_by);  // "it had used up its samples"

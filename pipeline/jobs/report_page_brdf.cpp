@@ -182,7 +182,6 @@ void AddModel(const PageFacts& facts, const brdf::TrainedBrdf& model, Html* html
                                                : "none";
   const auto codes = model.pack.codebook.size() / static_cast<size_t>(brdf.primitive_size);
   AddTrainingFacts(
-      facts,
       {{"file", brdf.files[0].path},
        {"colours in the file", CountText(static_cast<double>(brdf.cells)) + ", of which " +
                                    CountText(static_cast<double>(brdf.invalid_cells)) +

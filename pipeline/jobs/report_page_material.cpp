@@ -77,6 +77,10 @@ std::string Verdict(const PageFacts& facts, const Measurement& measurement,
   }
   text += ". Baked in " + SecondsText(facts.run.seconds) + "; the training stopped because " +
           StopText(facts.stopped_by) + ".";
+  if (const auto& choice = facts.manifest.training.choice) {
+    text += " What was asked for was " + std::string(choice->met ? "met" : "missed") + "; " +
+            choice->reason + ".";
+  }
   if (facts.manifest.quality.gate_min_psnr_db) {
     text += " The quality gate of " + FixedText(*facts.manifest.quality.gate_min_psnr_db, 1) +
             " dB was " + (facts.manifest.quality.gate_met ? "met." : "missed.");
@@ -332,16 +336,41 @@ void AddInputs(const PageFacts& facts, const JobSource& source, Html* html) {
   html->Close();
 }
 
+// How the profile followed from what was asked for.
+void AddChoice(const ManifestChoice& choice, Html* html) {
+  std::string asked;
+  if (choice.target_psnr_db > 0) asked = Decibels(choice.target_psnr_db) + " at full size";
+  if (choice.most_bytes > 0)
+    asked += (asked.empty() ? "" : ", ") + std::string("at most ") + BytesText(choice.most_bytes);
+  Table table;
+  table.caption = "Asked for: " + asked + ". Profiles that could have been chosen:";
+  table.heads = {"profile", "size", "reached", ""};
+  for (const ManifestCandidate& candidate : choice.candidates) {
+    const bool chosen = candidate.profile == choice.chosen;
+    std::string said = chosen ? "chosen" : "";
+    if (candidate.reached_db) said = candidate.given_up ? "given up on the way" : "not enough";
+    if (choice.most_bytes > 0 && candidate.bytes > choice.most_bytes)
+      said += (said.empty() ? "" : ", ") + std::string("too large");
+    table.rows.push_back({candidate.profile,
+                          {{BytesText(candidate.bytes)},
+                           {candidate.reached_db ? Decibels(*candidate.reached_db)
+                                                 : std::string(kNoValue)},
+                           {said}},
+                          chosen});
+  }
+  AddTable(table, html);
+}
+
 void AddTraining(const PageFacts& facts, const TrainedMaterial* model, Html* html) {
   if (model == nullptr) return;
   OpenSection("training", "Training and export", html);
   AddTrainingFacts(
-      facts,
       {{"samples", CountText(model->samples)},
        {"stopped because", StopText(model->stopped_by)},
        {"steps undone because a value was not finite", std::to_string(model->rollbacks)},
        {"learned channels", std::to_string(model->outputs)}},
       html);
+  if (facts.manifest.training.choice) AddChoice(*facts.manifest.training.choice, html);
   Table table;
   table.caption =
       "What the export to BC6H textures and half-precision weights costs: PSNR in dB of the "

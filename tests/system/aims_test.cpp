@@ -57,6 +57,10 @@ TEST_F(Aims, ASizeBudgetIsKeptToTheByte) {
   const Json manifest = Manifest(fits);
   EXPECT_TRUE(CheckAgainstSchema("manifest", manifest));
   EXPECT_EQ(manifest["profile"], "bcf-1k");
+  EXPECT_THAT(Patina({"info", fits["container"]}).out,
+              HasSubstr("asked for: at most " + std::to_string(bytes) + " bytes: met; bcf-1k is"));
+  EXPECT_THAT(ReadTextFile(fits["container"].get<std::string>() + "/report.html", 1 << 24).value_or(""),
+              HasSubstr("What was asked for was met; bcf-1k is the largest that fits"));
   EXPECT_EQ(manifest["training"]["choice"]["met"], true);
   EXPECT_EQ(Result(Bake("less", {"--size-budget", std::to_string(bytes - 1)}))["profile"],
             "bcf-0.5k");
