@@ -4,8 +4,6 @@
 // As in patina_train_bench, a measurement alternates with what it is compared with, and medians of
 // ratios are printed. Seconds are CPU seconds of one core. FLOPs counted: two for each multiply-add
 // of the network that does work (padding, lookups, loss and optimiser are overhead).
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +16,7 @@
 
 #include "formats/brdf/merl.h"
 #include "formats/brdf/write_brdf.h"
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/base/rng.h"
 #include "pipeline/brdf/batch_evaluator.h"
 #include "pipeline/brdf/grid_trainer.h"
@@ -29,22 +28,15 @@ namespace {
 
 constexpr int kRounds = 7;
 
-double CpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
-
 // Calls per CPU second.
 double Rate(double seconds, const std::function<void()>& body) {
   long calls = 0;
-  const double start = CpuSeconds();
+  const double start = ProcessCpuSeconds();
   double now = start;
   while (now - start < seconds) {
     for (int k = 0; k < 4; ++k) body();
     calls += 4;
-    now = CpuSeconds();
+    now = ProcessCpuSeconds();
   }
   return static_cast<double>(calls) / (now - start);
 }

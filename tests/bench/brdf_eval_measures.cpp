@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <numbers>
 #include <utility>
 
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/base/rng.h"
 #include "pipeline/brdf/sample_pool.h"
 #include "pipeline/jobs/measure_brdf.h"
@@ -124,12 +124,6 @@ void TakeImage(const brdf::SphereImage& wanted, const brdf::SphereImage& got, Th
     (*values)[kMaeFrame + i] = masked[i] * (squares ? std::sqrt(share) : share);
   }
   (*values)[kSsim] = error.ssim;
-}
-
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
 double Median(std::vector<double> values) {
@@ -322,10 +316,10 @@ Speed MeasureSpeed(const brdf::EvaluatePairs& function, const brdf::EvaluatePair
   for (size_t n = 0; n < kBatch; ++n) brdf::DrawPair(brdf::Draw::kDirections, &rng, &wi[n], &wo[n]);
   std::vector<float> rgb(3 * kBatch);
   const auto nanoseconds = [&](const brdf::EvaluatePairs& f) {
-    const double start = CpuSeconds();
+    const double start = ThreadCpuSeconds();
     double now = start;
     int calls = 0;
-    for (; now - start < kSeconds; now = CpuSeconds(), ++calls)
+    for (; now - start < kSeconds; now = ThreadCpuSeconds(), ++calls)
       f(0, kBatch, wi.data(), wo.data(), rgb.data());
     return 1e9 * (now - start) / calls / kBatch;
   };

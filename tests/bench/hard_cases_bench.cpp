@@ -6,13 +6,12 @@
 // (pipeline/base/thread_pool.h), so a result depends on that nowhere; the updates of the network,
 // which run between the loops, do not flush them, and always on the calling thread.
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <string>
 #include <vector>
 
+#include "pipeline/base/cpu_time.h"
 #include "tests/hard_cases/brdf_cases.h"
 #include "tests/hard_cases/map_cases.h"
 #include "tests/hard_cases/material_runs.h"
@@ -22,18 +21,11 @@ namespace {
 
 constexpr int kRounds = 7;
 
-double CpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
-
 template <class Body>
 double SecondsOf(Body&& body) {
-  const double start = CpuSeconds();
+  const double start = ProcessCpuSeconds();
   body();
-  return CpuSeconds() - start;
+  return ProcessCpuSeconds() - start;
 }
 
 template <class Hard, class Ordinary>

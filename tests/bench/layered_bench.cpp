@@ -3,8 +3,6 @@
 //   patina_layered_bench [--paths N]
 //
 // Times are processor time of one thread; programs that are compared take turns in one process.
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/layered/presets.h"
 #include "pipeline/layered/simulator.h"
 
@@ -21,12 +20,6 @@ namespace patina::layered {
 namespace {
 
 constexpr int kRounds = 9;
-
-double CpuSeconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 double Median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -38,9 +31,9 @@ std::vector<double> Alternate(const std::vector<std::function<void()>>& programs
   std::vector<std::vector<double>> times(programs.size());
   for (int round = 0; round < kRounds; ++round) {
     for (size_t p = 0; p < programs.size(); ++p) {
-      const double start = CpuSeconds();
+      const double start = ThreadCpuSeconds();
       programs[p]();
-      times[p].push_back(CpuSeconds() - start);
+      times[p].push_back(ThreadCpuSeconds() - start);
     }
   }
   std::vector<double> medians;
@@ -293,22 +286,22 @@ void PrintAccuracy() {
     accuracy.max_paths = 1 << 20;
     std::vector<double> errors, even_errors;
     double paths = 0;
-    double start = CpuSeconds();
+    double start = ThreadCpuSeconds();
     for (size_t i = 0; i < wi.size(); ++i) {
       const Estimate estimate = simulator.Evaluate(wi[i], wo[i], accuracy, 1);
       errors.push_back(Simulator::StandardError(estimate, wi[i], wo[i]));
       paths += estimate.spent;
     }
-    const double adaptive_s = CpuSeconds() - start;
+    const double adaptive_s = ThreadCpuSeconds() - start;
     const int each = static_cast<int>(paths / kPairs);
-    start = CpuSeconds();
+    start = ThreadCpuSeconds();
     for (size_t i = 0; i < wi.size(); ++i) {
       const Estimate estimate = simulator.Average(wi[i], wo[i], each, 1);
       even_errors.push_back(Simulator::StandardError(estimate, wi[i], wo[i]));
     }
     // Errors fall with the square root of the time.
     const double ratio = Worst(even_errors) / Worst(errors);
-    const double even_s = (CpuSeconds() - start) * ratio * ratio;
+    const double even_s = (ThreadCpuSeconds() - start) * ratio * ratio;
     std::printf("%10.5f %14.0f %10.5f %14.1f %22.1f\n", target, paths / kPairs, Worst(errors),
                 1e3 * adaptive_s, 1e3 * even_s);
   }

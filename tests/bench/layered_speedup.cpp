@@ -9,8 +9,6 @@
 // That of a simulation with n paths for each pair of directions falls as a / n; a is measured, and
 // the share of the reference's own noise, a / PATHS, is taken off what is measured. Times are
 // processor seconds of one thread for the same pairs of directions.
-#include <time.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -23,6 +21,7 @@
 
 #include "formats/index_pack.h"
 #include "formats/layered/layered_file.h"
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/brdf/batch_evaluator.h"
 #include "pipeline/brdf/sphere_render.h"
 #include "pipeline/brdf/train_brdf.h"
@@ -44,12 +43,6 @@ struct Options {
   Quality quality = Quality::kStandard;
   std::vector<std::string> files;
 };
-
-double Seconds(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 brdf::EvaluatePairs Simulated(const layered::Simulator& simulator, int paths, uint64_t seed) {
   return [&simulator, paths, seed](int, size_t count, const Direction* wi, const Direction* wo,
@@ -105,13 +98,13 @@ Status Measure(const std::string& file, const Options& options, ThreadPool& pool
   PATINA_ASSIGN(const layered::Stack stack, layered::ReadStack(file));
   Job job;
   job.quality = options.quality;
-  const double start_cpu = Seconds(CLOCK_PROCESS_CPUTIME_ID);
+  const double start_cpu = ProcessCpuSeconds();
   PATINA_ASSIGN(const brdf::Source source, layered::SimulatedSource(stack, EffortOfJob(job)));
   const brdf::SourceKind kind = brdf::KindOf(source);
   PATINA_ASSIGN(
       const brdf::TrainedBrdf trained,
       brdf::TrainBrdf(source, ModelOfJob(job, kind), TrainingOfJob(job, kind), pool, NoProgress()));
-  const double learning_s = Seconds(CLOCK_PROCESS_CPUTIME_ID) - start_cpu;
+  const double learning_s = ProcessCpuSeconds() - start_cpu;
   PATINA_ASSIGN(const std::vector<float> features,
                 ExpandCorners(trained.pack, {trained.pack.primitive_size, trained.pack.codebook}));
   PATINA_ASSIGN(const brdf::BatchEvaluator evaluator,
@@ -147,14 +140,14 @@ Status Measure(const std::string& file, const Options& options, ThreadPool& pool
   std::vector<float> rgb(3 * pairs.wi.size());
   std::vector<double> ratios, path_ns, neural_ns;
   for (int round = 0; round < 7; ++round) {
-    double start = Seconds(CLOCK_THREAD_CPUTIME_ID);
+    double start = ThreadCpuSeconds();
     Simulated(simulator, 1, 1)(0, pairs.wi.size(), pairs.wi.data(), pairs.wo.data(), rgb.data());
-    const double simulated_s = Seconds(CLOCK_THREAD_CPUTIME_ID) - start;
+    const double simulated_s = ThreadCpuSeconds() - start;
     constexpr int kRepeats = 8;
-    start = Seconds(CLOCK_THREAD_CPUTIME_ID);
+    start = ThreadCpuSeconds();
     for (int repeat = 0; repeat < kRepeats; ++repeat)
       neural(0, pairs.wi.size(), pairs.wi.data(), pairs.wo.data(), rgb.data());
-    const double neural_s = (Seconds(CLOCK_THREAD_CPUTIME_ID) - start) / kRepeats;
+    const double neural_s = (ThreadCpuSeconds() - start) / kRepeats;
     ratios.push_back(simulated_s / neural_s);
     path_ns.push_back(1e9 * simulated_s / static_cast<double>(pairs.wi.size()));
     neural_ns.push_back(1e9 * neural_s / static_cast<double>(pairs.wi.size()));

@@ -6,8 +6,6 @@
 // median of the ratios is printed: the machine's speed drifts, the ratio does not. Seconds are CPU
 // seconds of the threads that work.
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/base/cpu_time.h"
 #include "pipeline/base/rng.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/material/channel_stats.h"
@@ -29,25 +28,16 @@
 namespace patina {
 namespace {
 
-// CPU seconds of the process: a core taken away by another process does not count, a waiting
-// barrier does.
-double CpuSeconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-}
-
 // Runs body until `seconds` of CPU time have passed; returns calls per CPU second of one core.
 template <class Body>
 double Rate(double seconds, Body&& body) {
   long calls = 0, batch = 1;
-  const double start = CpuSeconds();
+  const double start = ProcessCpuSeconds();
   double now = start;
   while (now - start < seconds) {
     for (long k = 0; k < batch; ++k) body();
     calls += batch;
-    now = CpuSeconds();
+    now = ProcessCpuSeconds();
     if (now - start < seconds / 20) batch *= 2;
   }
   return static_cast<double>(calls) / (now - start);

@@ -30,18 +30,10 @@ TEST(LayeredMaterials, AreBakedLikeMeasuredOnes) {
   for (const auto& entry : fs::directory_iterator(folder / "in")) {
     if (entry.path().filename() != "lacquered_wood.layers.json") fs::remove(entry.path());
   }
-  const auto bake = [&](const std::string& out, const std::string& threads) {
-    const Outcome baked = Patina({"bake", folder / "in", "--out", folder / out, "--quality",
-                                  "preview", "--threads", threads, "--json"});
-    EXPECT_EQ(baked.exit_code, 0) << baked.err;
-    return folder / (out + "/lacquered_wood/current");
-  };
-  const std::string one = bake("one", "1"), two = bake("two", "2");
-  for (const char* file : {"grid.hpx", "decoder.weights", "sampler.bin", "manifest.json",
-                           "report.json", "preview.png"}) {
-    EXPECT_EQ(ReadAll(one + "/" + file), ReadAll(two + "/" + file)) << file;
-  }
-  const Json manifest = Json::parse(ReadAll(one + "/manifest.json"));
+  const Outcome baked =
+      Patina({"bake", folder / "in", "--out", folder / "out", "--quality", "preview", "--json"});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  const Json manifest = Json::parse(ReadAll(folder / "out/lacquered_wood/current/manifest.json"));
   const Status status = CheckAgainstSchema("manifest", manifest);
   EXPECT_TRUE(status) << status.error().message;
   EXPECT_EQ(manifest["kind"], "brdf");

@@ -2,7 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "formats/layered/layered_file.h"
+#include "pipeline/base/thread_pool.h"
+#include "pipeline/brdf/sample_pool.h"
 #include "pipeline/layered/presets.h"
 #include "tests/pipeline/layered/statistics.h"
 
@@ -45,6 +51,28 @@ TEST(SimulatedSource, IsATableLikeAnyOther) {
   EXPECT_GE(cost.paths, 32u);
   EXPECT_GT(cost.standard_error, 0);
   EXPECT_LT(cost.standard_error, 0.05);
+}
+
+TEST(SimulatedSource, GivesTheSameSamplesToAnyNumberOfThreads) {
+  Effort effort;
+  effort.accuracy = {0.05, 8, 8, 32};
+  brdf::PoolOptions options;
+  options.count = 3000;
+  const auto draw = [&](int threads) {
+    const auto source = SimulatedSource(CoatOn(Diffuse(0.5), 0.2), effort);
+    ThreadPool pool(threads);
+    const auto samples = brdf::DrawPool(*source, brdf::GridShape(), options, pool);
+    std::vector<float> values;
+    for (size_t i = 0; i < samples.size(); ++i) {
+      for (const float value : samples[i].value) values.push_back(value);
+      values.push_back(samples[i].importance);
+    }
+    EXPECT_GT(samples.size(), 2500u);
+    return std::pair(values, source->simulated->Spent().paths);
+  };
+  const auto one = draw(1);
+  EXPECT_EQ(draw(3), one);
+  EXPECT_GT(*std::max_element(one.first.begin(), one.first.end()), 0.1f);
 }
 
 TEST(SimulatedSource, NoisyValuesCountForLess) {
