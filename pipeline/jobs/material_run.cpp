@@ -7,6 +7,7 @@
 
 #include "formats/base/check.h"
 #include "formats/base/file_io.h"
+#include "formats/model_bytes.h"
 #include "pipeline/jobs/ingest.h"
 #include "pipeline/jobs/job_sets.h"
 #include "pipeline/jobs/measure.h"
@@ -47,8 +48,24 @@ class MaterialRun : public StagedRun {
       PATINA_TRY(Stage("verify", [this] { return Verify(); }));
     } while (TriesNextProfile(result_.psnr->mip0_db, false));
     PATINA_TRY(Stage("report", [this] { return Report(); }));
-    return Stage("publish",
-                 [this] { return WhatIsMissed().empty() ? Publish(Curve()) : Reject(); });
+    PATINA_TRY(
+        Stage("publish", [this] { return WhatIsMissed().empty() ? Publish(Curve()) : Reject(); }));
+    WarnOfTime();
+    return {};
+  }
+
+  // What follows the training cannot be shortened.
+  void WarnOfTime() {
+    constexpr double kKept = 1.05;
+    const double seconds = SecondsSoFar();
+    if (job_.time_budget_s == 0 || seconds <= kKept * job_.time_budget_s) return;
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "took %.1f s, more than its time budget of %.3g s: encoding and checking the files alone "
+        "need most of that; ask for a smaller profile, --quality preview or more time",
+        seconds, job_.time_budget_s);
+    sink_.OnWarning(text);
   }
 
   Status Ingest() {
@@ -91,14 +108,8 @@ class MaterialRun : public StagedRun {
     TrainOptions options = OptionsOfJob();
     if (job_.target_psnr_db > 0)
       options.target_psnr_db = std::max(1e-3, job_.target_psnr_db - ConstantsGainDb());
-    if (job_.time_budget_s > 0) {
-      // The budget is for the whole job: leave time for what follows the training.
-      constexpr double kCpuSecondsPerTexelChannel = 1e-7;
-      const double later = kCpuSecondsPerTexelChannel * source_.reference.width *
-                           source_.reference.height *
-                           static_cast<double>(material.channels.size()) / pool_->threads();
-      options.time_budget_s = std::max(0.1, job_.time_budget_s - SecondsSoFar() - later);
-    }
+    if (job_.time_budget_s > 0)
+      options.time_budget_s = std::max(0.1, job_.time_budget_s - SecondsSoFar());
     TrainedMaterial model;
     do {
       // The last one that fits is trained to the end: its container is kept for a look.

@@ -11,6 +11,7 @@
 #include "pipeline/material/exporter.h"
 #include "pipeline/material/feature_init.h"
 #include "pipeline/material/quality_trend.h"
+#include "pipeline/material/time_reserve.h"
 #include "pipeline/material/trainer.h"
 
 namespace patina {
@@ -52,11 +53,9 @@ double CosineRate(double progress) {
 // progress follow the clock, a reached target or a flat slope brings the end near.
 class Schedule {
  public:
-  Schedule(const TrainOptions& options, double budget, double reserve_s) : options_(options), end_(budget) {
-    Reserve(reserve_s);
-  }
+  Schedule(const TrainOptions& options, double budget) : options_(options), end_(budget) {}
 
-  // The export as it is now expected to take.
+  // What follows the training, as it is now expected to take.
   void Reserve(double reserve_s) {
     if (options_.time_budget_s > 0) train_s_ = std::max(0.2 * options_.time_budget_s, options_.time_budget_s - reserve_s);
   }
@@ -64,7 +63,7 @@ class Schedule {
   double Progress(double samples, double elapsed_s) {
     const double by_samples = samples / end_;
     const double by_time = train_s_ > 0 ? elapsed_s / train_s_ : 0;
-    progress_ = std::max({progress_, by_samples, by_time});
+    progress_ = std::max(by_samples, by_time);
     // Where both end together the budget of samples was spent, whoever led on the way.
     if (progress_ >= 1 && !ending_ && by_samples < 0.98) stopped_by_ = "time";
     return progress_;
@@ -111,18 +110,6 @@ class Schedule {
   double last_samples_ = 0, last_psnr_db_ = 0;
   const char* stopped_by_ = "budget";
 };
-
-// What the export of a training takes beside the tuning of the network, in re-encodes on the way.
-constexpr double kExportPerEncode = 4;
-
-// Seconds that the export will take, before a re-encode has shown how fast the machine is: a block costs about 50 microseconds of one core in all passes.
-double ExportSeconds(const FeatureStore& store, int threads) {
-  double blocks = 0;
-  for (const auto& texture : store.textures) {
-    for (const FeatureLevel& level : texture) blocks += level.block_count();
-  }
-  return 5e-5 * blocks / threads;
-}
 
 AdamRates FeatureRates(double factor) {
   AdamRates rates;
@@ -304,17 +291,21 @@ Status TrainPatina(const MaterialReference& reference, const MaterialKernels& ke
   const bool quick = options.quality == Quality::kPreview;
   double next_record = quick ? 0.5 : 1.0 / 16;
   RateGuard guard(options.rate_fault);
-  Schedule schedule(options, budget, ExportSeconds(store, pool.threads()));
+  Schedule schedule(options, budget);
+  TimeReserve reserve(reference, store, quick ? 0 : static_cast<int>(std::size(kReencodeAt)), kTuneShare * budget, pool.threads());
   while (!session->cancelled()) {
+    schedule.Reserve(reserve.Seconds());
     const double progress = schedule.Progress(trainer.samples(), session->seconds());
     if (progress >= 1) break;
     const double factor = CosineRate(progress);
+    const double samples = trainer.samples(), step_begin = session->seconds();
     PATINA_TRY(GuardedStep(&trainer, &guard, FeatureRates(factor), NetworkRates(kNetworkRate * factor), false));
+    reserve.CountStep(trainer.samples() - samples, session->seconds() - step_begin);
     if (!quick && next_reencode < std::size(kReencodeAt) && progress >= kReencodeAt[next_reencode]) {
       ++next_reencode;
-      const double begin = session->seconds(), rate = trainer.samples() / begin;
+      const double begin = session->seconds();
       exporter.Encode(bc6::Effort::kFull);
-      schedule.Reserve(kExportPerEncode * (session->seconds() - begin) + kTuneShare * budget / rate);
+      reserve.CountEncode(session->seconds() - begin);
       trainer.Save();
     }
     if (progress >= next_record) {

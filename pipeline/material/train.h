@@ -51,7 +51,7 @@ struct TrainOptions {
   Recipe recipe = Recipe::kPatina;
   Quality quality = Quality::kStandard;
   uint64_t seed = 1;
-  double time_budget_s = 0;     // 0: none. Stops early enough to export within it; not reproducible to the byte
+  double time_budget_s = 0;     // 0: none. Leaves room to export, verify and report within it; not reproducible to the byte
   double target_psnr_db = 0;    // 0: none. Stops once the held-out PSNR of mip 0 is there
   bool give_up = false;         // ends without a model (stopped_by "hopeless") once the target is out of reach: see GainToCome
   double samples = 0;           // 0: by quality and size. Otherwise train with exactly this many (rounded up to a step)

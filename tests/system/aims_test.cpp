@@ -14,6 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 using namespace testing_support;
 using Json = nlohmann::json;
 
@@ -59,8 +60,9 @@ TEST_F(Aims, ASizeBudgetIsKeptToTheByte) {
   EXPECT_EQ(manifest["profile"], "bcf-1k");
   EXPECT_THAT(Patina({"info", fits["container"]}).out,
               HasSubstr("asked for: at most " + std::to_string(bytes) + " bytes: met; bcf-1k is"));
-  EXPECT_THAT(ReadTextFile(fits["container"].get<std::string>() + "/report.html", 1 << 24).value_or(""),
-              HasSubstr("What was asked for was met; bcf-1k is the largest that fits"));
+  EXPECT_THAT(
+      ReadTextFile(fits["container"].get<std::string>() + "/report.html", 1 << 24).value_or(""),
+      HasSubstr("What was asked for was met; bcf-1k is the largest that fits"));
   EXPECT_EQ(manifest["training"]["choice"]["met"], true);
   EXPECT_EQ(Result(Bake("less", {"--size-budget", std::to_string(bytes - 1)}))["profile"],
             "bcf-0.5k");
@@ -93,6 +95,14 @@ TEST_F(Aims, ATargetGetsTheSmallestProfileThatReachesIt) {
   EXPECT_FALSE(choice["candidates"][1].contains("reached_psnr_db"));
   EXPECT_EQ(Result(Bake("u", {"--target-psnr", std::to_string(small - 0.5)}))["profile"],
             "bcf-0.5k");
+}
+
+TEST_F(Aims, ATimeThatIsTooShortIsSaid) {
+  const Outcome hurried = Bake("hurried", {"--time-budget", "0.001"});
+  EXPECT_EQ(hurried.exit_code, 0);
+  EXPECT_THAT(hurried.err, HasSubstr("more than its time budget of 0.001 s"));
+  EXPECT_EQ(Manifest(Result(hurried))["training"]["stopped_by"], "time");
+  EXPECT_THAT(Bake("patient", {"--time-budget", "1000"}).err, Not(HasSubstr("time budget")));
 }
 
 TEST_F(Aims, ATargetOutOfReachIsSaidAndKeptBeside) {
