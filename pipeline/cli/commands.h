@@ -6,6 +6,7 @@
 #include "formats/base/result.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/cli/options.h"
+#include "pipeline/validate/validate.h"
 
 namespace patina {
 
@@ -20,7 +21,9 @@ int ShaderCommand(const CommandLine& line);
 int TradeoffCommand(const CommandLine& line, const CancelToken& cancel);
 int PackCommand(const CommandLine& line, const CancelToken& cancel);
 int UnpackArchiveCommand(const CommandLine& line, const CancelToken& cancel);
-int ValidateCommand(const CommandLine& line, const CancelToken& cancel);
+// `remeasure`: what --against asks for, or nullptr where images cannot be read.
+int ValidateCommand(const CommandLine& line, validate::RemeasureFunction remeasure,
+                    const CancelToken& cancel);
 
 // "patina: error: <message>" on standard error.
 void PrintError(const std::string& message);

@@ -1,111 +1,70 @@
-#include <csignal>
-#include <cstdio>
-#include <exception>
+// `patina`: starts at once; what needs the image library is done by patina-bake.
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <string>
 
 #include "pipeline/cli/commands.h"
-#include "pipeline/cli/options.h"
+#include "pipeline/cli/program.h"
 #include "pipeline/jobs/job_result.h"
-#include "pipeline/kernels/dispatch.h"
 
 namespace patina {
 namespace {
 
-CancelToken g_cancel;
+// The same place in a build, below /usr and below any other prefix.
+constexpr char kBakeProgram[] = "/../libexec/patina/patina-bake";
 
-extern "C" void OnSignal(int) { g_cancel.Cancel(); }
-
-void HandleSignals() {
-  struct sigaction action {};
-  action.sa_handler = OnSignal;
-  // The second signal ends the process at once; what is staged is then removed by the next bake of
-  // the asset.
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  // A reader that goes away (`patina bake ... | head`) must not end a bake half way.
-  std::signal(SIGPIPE, SIG_IGN);
-}
-
-int Dispatch(const CommandLine& line) {
-  if (!line.simd.empty()) {
-    const Status forced = ForceSimdTarget(line.simd);
-    if (!forced) {
-      PrintError(forced.error().message);
-      return kExitFailed;
-    }
+// Returns only if that fails. Signals, working folder and descriptors are inherited; the process
+// stays the same, so who waits for it or ends it need not know.
+int BecomeBakeProgram(char** argv) {
+  char self[4096];
+  const ssize_t size = ::readlink("/proc/self/exe", self, sizeof self);
+  if (size <= 0 || size == static_cast<ssize_t>(sizeof self)) {
+    PrintError("cannot tell where this program lies; is /proc mounted?");
+    return kExitFailed;
   }
-  switch (line.command) {
-    case Command::kBake:
-      return BakeCommand(line, g_cancel);
-    case Command::kRun:
-      return RunCommand(line, g_cancel);
-    case Command::kUnpack:
-      return UnpackCommand(line, g_cancel);
-    case Command::kInfo:
-      return InfoCommand(line);
-    case Command::kCompare:
-      return CompareCommand(line, g_cancel);
-    case Command::kEval:
-      return EvalCommand(line);
-    case Command::kSample:
-      return SampleCommand(line);
-    case Command::kShader:
-      return ShaderCommand(line);
-    case Command::kTradeoff:
-      return TradeoffCommand(line, g_cancel);
-    case Command::kPack:
-      return PackCommand(line, g_cancel);
-    case Command::kUnpackArchive:
-      return UnpackArchiveCommand(line, g_cancel);
-    case Command::kValidate:
-      return ValidateCommand(line, g_cancel);
-    case Command::kSubmit:
-      return SubmitCommand(line.client, g_cancel);
-    case Command::kJobs:
-      return JobsCommand(line.client, g_cancel);
-    case Command::kWatch:
-      return WatchCommand(line.client, g_cancel);
-    case Command::kCancel:
-      return CancelCommand(line.client, g_cancel);
-    case Command::kRetry:
-      return RetryCommand(line.client, g_cancel);
-    case Command::kLogs:
-      return LogsCommand(line.client, g_cancel);
-    case Command::kStatus:
-      return StatusCommand(line.client, g_cancel);
-  }
+  const std::string own(self, static_cast<size_t>(size));
+  const std::string program = own.substr(0, own.rfind('/')) + kBakeProgram;
+  ::execv(program.c_str(), argv);
+  PrintError("cannot start " + program + ": " + std::strerror(errno) +
+             "; it is built and installed together with this one: install patina again");
   return kExitFailed;
 }
 
-int Main(int argc, char** argv) {
-  HandleSignals();
-  const ParsedCommandLine parsed = ParseCommandLine(argc, argv);
-  if (!parsed.command) {
-    if (parsed.exit_code != 0) {
-      PrintError(parsed.text);
-      return parsed.exit_code;
-    }
-    std::fputs(parsed.text.c_str(), stdout);
-    return kExitDone;
+int DispatchHere(const CommandLine& line, const CancelToken& cancel, char** argv) {
+  if (NeedsImages(line)) return BecomeBakeProgram(argv);
+  switch (line.command) {
+    case Command::kInfo:
+      return InfoCommand(line);
+    case Command::kEval:
+      return EvalCommand(line);
+    case Command::kShader:
+      return ShaderCommand(line);
+    case Command::kPack:
+      return PackCommand(line, cancel);
+    case Command::kUnpackArchive:
+      return UnpackArchiveCommand(line, cancel);
+    case Command::kValidate:
+      return ValidateCommand(line, nullptr, cancel);
+    case Command::kJobs:
+      return JobsCommand(line.client, cancel);
+    case Command::kWatch:
+      return WatchCommand(line.client, cancel);
+    case Command::kCancel:
+      return CancelCommand(line.client, cancel);
+    case Command::kRetry:
+      return RetryCommand(line.client, cancel);
+    case Command::kLogs:
+      return LogsCommand(line.client, cancel);
+    case Command::kStatus:
+      return StatusCommand(line.client, cancel);
+    default:
+      return kExitFailed;
   }
-  const int exit_code = Dispatch(*parsed.command);
-  if (std::fflush(stdout) != 0 && exit_code == kExitDone) {
-    PrintError("standard output cannot be written; is the disk full?");
-    return kExitFailed;
-  }
-  return exit_code;
 }
 
 }  // namespace
 }  // namespace patina
 
-int main(int argc, char** argv) {
-  try {
-    return patina::Main(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "patina: error: unexpected failure: %s\n", error.what());
-  } catch (...) {
-    std::fprintf(stderr, "patina: error: unexpected failure\n");
-  }
-  return patina::kExitFailed;
-}
+int main(int argc, char** argv) { return patina::RunProgram(argc, argv, patina::DispatchHere); }

@@ -42,7 +42,8 @@ Result<Job> SourceJob(const std::string& source) {
 }
 
 // Options come over what a configuration file says.
-Result<ValidateOptions> OptionsOf(const ValidateArguments& given) {
+Result<ValidateOptions> OptionsOf(const ValidateArguments& given,
+                                  validate::RemeasureFunction remeasure) {
   ValidateOptions options;
   options.paths = given.paths;
   options.targets.current_only = given.current_only;
@@ -55,7 +56,8 @@ Result<ValidateOptions> OptionsOf(const ValidateArguments& given) {
     PATINA_ASSIGN(options.baseline, validate::ReadBaseline(given.baseline));
   }
   if (!given.against.empty()) {
-    PATINA_ASSIGN(options.against, SourceJob(given.against));
+    PATINA_ASSIGN(Job source, SourceJob(given.against));
+    options.against = validate::Against{std::move(source), remeasure};
   }
   std::error_code ignored;
   if (!given.inputs.empty() && !fs::is_directory(given.inputs, ignored))
@@ -76,14 +78,15 @@ std::string Summary(const ValidationReport& report) {
 
 }  // namespace
 
-int ValidateCommand(const CommandLine& line, const CancelToken& cancel) {
+int ValidateCommand(const CommandLine& line, validate::RemeasureFunction remeasure,
+                    const CancelToken& cancel) {
   const ValidateArguments& given = line.validate;
   if (given.list_codes) {
     std::fputs(validate::CatalogueText().c_str(), stdout);
     return kValid;
   }
   if (given.paths.empty()) return UsageError("PATH is required; see `patina validate --help`");
-  auto options = OptionsOf(given);
+  auto options = OptionsOf(given, remeasure);
   if (!options) return UsageError(options.error().message);
   ThreadPool pool(line.threads);
   TerminalProgress progress(stderr, line.verbosity, "patina");

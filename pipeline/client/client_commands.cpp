@@ -14,7 +14,6 @@
 
 #include "pipeline/client/client_text.h"
 #include "pipeline/client/http_client.h"
-#include "pipeline/client/submit_plan.h"
 #include "pipeline/jobs/job_result.h"
 
 namespace patina {
@@ -267,12 +266,12 @@ std::string DefaultSocketPath() {
   return own.empty() || (!IsSocket(own) && IsSocket(of_system)) ? of_system : own;
 }
 
-int SubmitCommand(const ClientOptions& options, const CancelToken& cancel) {
+int SubmitCommand(const ClientOptions& options, SubmitPlanner planner, const CancelToken& cancel) {
   std::vector<PlannedSubmit> plan;
   for (const std::string& input : options.inputs) {
     std::vector<PlannedSubmit> more =
-        PlanSubmit(input, {options.out, options.priority, options.force, options.working_space,
-                           options.color_space, options.ocio});
+        planner(input, {options.out, options.priority, options.force, options.working_space,
+                        options.color_space, options.ocio});
     std::move(more.begin(), more.end(), std::back_inserter(plan));
   }
   if (!options.idempotency_key.empty() && plan.size() != 1) {

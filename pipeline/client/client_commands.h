@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "pipeline/base/progress.h"
+#include "pipeline/client/submit_plan.h"
 
 namespace patina {
 
@@ -36,7 +37,9 @@ struct ClientOptions {
 // service: /var/lib/patina.
 std::string DefaultSocketPath();
 
-int SubmitCommand(const ClientOptions& options, const CancelToken& cancel);
+// `planner` is PlanSubmit: handed in, as it reads images and the other commands must not load the
+// library for them.
+int SubmitCommand(const ClientOptions& options, SubmitPlanner planner, const CancelToken& cancel);
 int JobsCommand(const ClientOptions& options, const CancelToken& cancel);
 int WatchCommand(const ClientOptions& options, const CancelToken& cancel);
 int CancelCommand(const ClientOptions& options, const CancelToken& cancel);

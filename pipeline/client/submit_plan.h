@@ -27,5 +27,6 @@ struct SubmitSettings {
 // input: a job file, a BRDF file, a folder of maps, or a folder of such. Paths are made absolute:
 // the daemon has another working folder. Assets that cannot be baked are listed with their error.
 std::vector<PlannedSubmit> PlanSubmit(const std::string& input, const SubmitSettings& settings);
+using SubmitPlanner = decltype(&PlanSubmit);
 
 }  // namespace patina

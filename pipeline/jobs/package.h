@@ -37,6 +37,4 @@ Status AsInternal(Status status);
 std::map<std::string, double> MapsOfPoint(const MaterialReference& reference,
                                           const CurvePoint& point);
 
-uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads);
-
 }  // namespace patina

@@ -11,6 +11,7 @@
 #include "formats/base/file_io.h"
 #include "formats/base/sha256.h"
 #include "formats/container.h"
+#include "formats/model_bytes.h"
 #include "pipeline/jobs/brdf_group.h"
 #include "pipeline/jobs/job_runner.h"
 #include "pipeline/jobs/package.h"

@@ -11,7 +11,6 @@
 #include "formats/container.h"
 #include "pipeline/validate/archive_files.h"
 #include "pipeline/validate/check_container.h"
-#include "pipeline/validate/remeasure.h"
 
 namespace patina::validate {
 namespace {
@@ -121,7 +120,8 @@ ValidationReport Validate(const ValidateOptions& options, ThreadPool& pool,
   });
   if (options.against) {
     for (size_t i = 0; i < report.targets.size() && !cancel.cancelled(); ++i)
-      Remeasure(report.targets[i], *options.against, pool, cancel, progress, &lists[i]);
+      options.against->remeasure(report.targets[i], options.against->source, pool, cancel, progress,
+                                 &lists[i]);
   }
   Baseline left = options.baseline;
   for (size_t i = 0; i < lists.size(); ++i) {

@@ -27,13 +27,24 @@ struct AcceptedFinding {
 };
 using Baseline = std::set<AcceptedFinding>;
 
+// Measures a target against the source it was baked from: see remeasure.h, which is not called from
+// here because it needs the image library.
+using RemeasureFunction = void (*)(const Target& target, const Job& source, ThreadPool& pool,
+                                   const CancelToken& cancel, ProgressSink& progress,
+                                   FindingList* findings);
+
+struct Against {
+  Job source;
+  RemeasureFunction remeasure;  // never nullptr
+};
+
 struct ValidateOptions {
   std::vector<std::string> paths;
   TargetOptions targets;
   std::map<int, Severity> severities;  // in place of the catalogue's
   Severity fail_on = Severity::kError;
-  std::string inputs;          // folder of the source files, to compare their hashes; or empty
-  std::optional<Job> against;  // the source to measure against
+  std::string inputs;  // folder of the source files, to compare their hashes; or empty
+  std::optional<Against> against;
   Baseline baseline;
 };
 

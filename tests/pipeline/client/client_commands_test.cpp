@@ -21,6 +21,10 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using Json = nlohmann::json;
 
+int Submit(const ClientOptions& options, const CancelToken& cancel) {
+  return SubmitCommand(options, PlanSubmit, cancel);
+}
+
 class ClientCommands : public ::testing::Test {
  protected:
   ClientCommands() {
@@ -81,7 +85,7 @@ TEST_F(ClientCommands, SubmitJobFilesAndFolders) {
   options_.inputs = {folder_ / "job.json", folder_ / "gold.bsdf"};
   options_.priority = 7;
   options_.force = true;
-  EXPECT_EQ(Run(SubmitCommand), kExitDone);
+  EXPECT_EQ(Run(Submit), kExitDone);
   EXPECT_EQ(out_, "100 wall\n101 gold\n");
   ASSERT_EQ(service_.submitted.size(), 2u);
   EXPECT_EQ(service_.submitted[0].job.folder, folder_ / "maps");
@@ -96,7 +100,7 @@ TEST_F(ClientCommands, SubmitWhatCanBeSubmitted) {
   ASSERT_OK(WriteFileDurably(folder_ / "gold.bsdf", std::string_view("x")));
   options_.inputs = {folder_ / "missing", folder_ / "gold.bsdf"};
   options_.json = true;
-  EXPECT_EQ(Run(SubmitCommand), kExitBadInput);
+  EXPECT_EQ(Run(Submit), kExitBadInput);
   const Json jobs = Json::parse(out_)["jobs"];
   ASSERT_EQ(jobs.size(), 2u);
   EXPECT_THAT(jobs[0]["error"].get<std::string>(), HasSubstr("no folder or file"));
@@ -107,12 +111,12 @@ TEST_F(ClientCommands, SubmitOnceForAKey) {
   ASSERT_OK(WriteFileDurably(folder_ / "gold.bsdf", std::string_view("x")));
   options_.inputs = {folder_ / "gold.bsdf"};
   options_.idempotency_key = "key";
-  EXPECT_EQ(Run(SubmitCommand), kExitDone);
-  EXPECT_EQ(Run(SubmitCommand), kExitDone);
+  EXPECT_EQ(Run(Submit), kExitDone);
+  EXPECT_EQ(Run(Submit), kExitDone);
   EXPECT_EQ(out_, "100 gold\n");
   EXPECT_EQ(service_.submitted.size(), 1u);
   options_.inputs.push_back(folder_ / "gold.bsdf");
-  EXPECT_EQ(Run(SubmitCommand), kExitUsage);
+  EXPECT_EQ(Run(Submit), kExitUsage);
 }
 
 TEST_F(ClientCommands, WaitForAJobAndReturnItsExitCode) {
@@ -121,7 +125,7 @@ TEST_F(ClientCommands, WaitForAJobAndReturnItsExitCode) {
   options_.inputs = {folder_ / "gold.bsdf"};
   options_.wait = true;
   std::thread end = EndJobOnceWatched(100, daemon::JobState::kFailed);
-  EXPECT_EQ(Run(SubmitCommand), kExitFailed);
+  EXPECT_EQ(Run(Submit), kExitFailed);
   end.join();
   EXPECT_THAT(err_, HasSubstr("100 wall100: failed"));
 }
@@ -210,7 +214,7 @@ TEST_F(ClientCommands, SayWhatToDoWithoutADaemon) {
   options_.inputs = {folder_ / "gold.bsdf"};
   ASSERT_OK(WriteFileDurably(folder_ / "gold.bsdf", std::string_view("x")));
   for (auto* command : {JobsCommand, WatchCommand, CancelCommand, RetryCommand, LogsCommand,
-                        StatusCommand, SubmitCommand}) {
+                        StatusCommand, Submit}) {
     EXPECT_EQ(Run(command), kExitFailed);
     EXPECT_THAT(err_, HasSubstr("no daemon listens on"));
     EXPECT_THAT(err_, HasSubstr("patinad --watch DIR --out DIR"));

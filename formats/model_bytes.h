@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "formats/manifest.h"
+
+namespace patina {
+
+// What an engine loads of a container, in bytes: without reports and previews.
+uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads);
+
+}  // namespace patina
