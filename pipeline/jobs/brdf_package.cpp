@@ -9,8 +9,11 @@
 #include "formats/brdf_sampler.h"
 #include "formats/index_pack.h"
 #include "formats/layered/layered_file.h"
+#include "formats/manifest_json.h"
 #include "formats/weights.h"
+#include "pipeline/brdf/anisotropy.h"
 #include "pipeline/brdf/sampler_fit.h"
+#include "pipeline/jobs/brdf_effects.h"
 #include "pipeline/jobs/brdf_job.h"
 #include "pipeline/jobs/load_brdf_decoder.h"
 #include "pipeline/jobs/package.h"
@@ -95,15 +98,23 @@ Result<BrdfSource> ReadBrdfSource(const Job& job) {
   }
   for (std::string& warning : source.data.warnings) warning = WithoutFolder(warning, job.file);
   source.sha256 = after.sha256;
-  source.fingerprint = BrdfFingerprint(job, after.sha256);
+  brdf::Source& data = source.data;
+  if (!data.isotropic && data.table && !data.simulated) {
+    source.anisotropy =
+        brdf::MeasureAnisotropy(*data.table, static_cast<double>(data.max_theta_rad));
+    data.isotropic = *source.anisotropy <= brdf::kIsotropicWithin;
+  }
+  source.fingerprint = BrdfFingerprint(job, source);
   return source;
 }
 
-std::string BrdfFingerprint(const Job& job, const std::string& sha256,
+std::string BrdfFingerprint(const Job& job, const BrdfSource& source,
                             const std::vector<std::string>& group) {
   Sha256 hash;
   hash.Update("patina brdf\nrecipe " + std::to_string(kBrdfRecipeVersion) + "\njob " +
-              CanonicalJob(job) + "\nfile " + sha256 + "\n");
+              CanonicalJob(job) + "\nfile " + source.sha256 + "\n");
+  // Versions without this measure trained such files as anisotropic.
+  if (source.anisotropy && source.data.isotropic) hash.Update("without azimuth\n");
   for (const std::string& member : group) hash.Update("trained with " + member + "\n");
   return hash.FinishHex();
 }
@@ -191,6 +202,7 @@ Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::Mode
   model.layers.insert(model.layers.end(), static_cast<size_t>(shape.hidden_layers), shape.hidden);
   model.layers.push_back(brdf::kOutputs);
   manifest.brdf = std::move(model);
+  manifest.effects = DescribeBrdfEffects(job, source, shape);
   return manifest;
 }
 
@@ -233,6 +245,8 @@ std::string BrdfReportToJson(const Manifest& manifest, const std::vector<Manifes
                                     {"effects", described.simulation->effects},
                                     {"left_out", described.simulation->left_out}};
   }
+  if (source.anisotropy) json["source"]["anisotropy"] = *source.anisotropy;
+  json["effects"] = EffectsToJson(manifest.effects);
   json["model"] = ModelJson(described);
   json["quality"] = QualityJson(measurement, source.data.table == nullptr);
   json["training"] = {

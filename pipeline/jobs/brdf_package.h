@@ -1,6 +1,7 @@
 // From a trained BRDF to the payloads and the manifest of a container.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,9 @@ namespace patina {
 
 // A BRDF file in memory, and the fingerprint of what is made from it.
 struct BrdfSource {
-  brdf::Source data;  // its warnings name no folder
+  brdf::Source data;  // its warnings name no folder; isotropic where it is, whatever the format allows
+  // What MeasureAnisotropy says of a table whose format allows for azimuths; else absent.
+  std::optional<double> anisotropy;
   std::string sha256;
   std::string fingerprint;  // see BrdfFingerprint
 };
@@ -32,7 +35,7 @@ struct SharedCodebook {
 
 // SHA-256 of what decides the bytes of the container: recipe version, canonical job, the file's
 // hash, and those of the files that are trained together with it.
-std::string BrdfFingerprint(const Job& job, const std::string& sha256,
+std::string BrdfFingerprint(const Job& job, const BrdfSource& source,
                             const std::vector<std::string>& group = {});
 
 // Writes the codebook of a model to `folder`, under a name that its bytes decide. Errors: those of

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "formats/base/file_io.h"
+#include "formats/model_bytes.h"
 #include "pipeline/jobs/brdf_job.h"
 #include "pipeline/jobs/measure_brdf.h"
 #include "pipeline/jobs/package.h"
@@ -46,7 +47,7 @@ class BrdfRun : public StagedRun {
     reading_input_ = true;
     if (trained_ != nullptr) {
       source_ = std::move(trained_->source);
-      source_.fingerprint = BrdfFingerprint(job_, source_.sha256, trained_->group);
+      source_.fingerprint = BrdfFingerprint(job_, source_, trained_->group);
     } else {
       PATINA_ASSIGN(source_, ReadBrdfSource(job_));
     }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "formats/model_bytes.h"
 #include "pipeline/jobs/package.h"
 
 namespace patina {
@@ -144,6 +145,7 @@ std::string BrdfText(const Manifest& m) {
                    static_cast<unsigned long long>(brdf.cells),
                    static_cast<unsigned long long>(brdf.invalid_cells));
   }
+  text += EffectsText(m);
   for (const std::string& warning : m.warnings) text += "Warning: " + warning + "\n";
   return text;
 }
@@ -166,17 +168,17 @@ std::string ContainerText(const Container& container) {
   text += "\n";
   if (m.training.choice) {
     const ManifestChoice& choice = *m.training.choice;
-    text += Format("  asked for:%s%s: %s; ",
-                   choice.target_psnr_db > 0
-                       ? Format(" %.2f dB of mip 0", choice.target_psnr_db).c_str()
-                       : "",
-                   choice.most_bytes > 0
-                       ? Format(" at most %llu bytes",
-                                static_cast<unsigned long long>(choice.most_bytes))
-                             .c_str()
-                       : "",
-                   choice.met ? "met" : "missed") +
-            choice.reason + "\n";
+    text +=
+        Format(
+            "  asked for:%s%s: %s; ",
+            choice.target_psnr_db > 0 ? Format(" %.2f dB of mip 0", choice.target_psnr_db).c_str()
+                                      : "",
+            choice.most_bytes > 0
+                ? Format(" at most %llu bytes", static_cast<unsigned long long>(choice.most_bytes))
+                      .c_str()
+                : "",
+            choice.met ? "met" : "missed") +
+        choice.reason + "\n";
   }
   if (m.quality.gate_min_psnr_db) {
     text += Format("  quality gate %.2f dB: %s\n", *m.quality.gate_min_psnr_db,

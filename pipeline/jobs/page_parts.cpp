@@ -4,6 +4,8 @@
 
 #include "formats/base/file_io.h"
 #include "formats/base/zstd_frame.h"
+#include "formats/model_bytes.h"
+#include "pipeline/effects/effects.h"
 #include "pipeline/jobs/package.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/quantity.h"
@@ -14,6 +16,19 @@ namespace {
 
 constexpr const char* kMiddleDot = " \xC2\xB7 ";
 constexpr const char* kTimes = "\xC3\x97";
+
+// What the manifest has in place of a channel that was not learned.
+std::string ConstantOf(const Manifest& manifest, const std::string& channel) {
+  for (const ManifestChannel& entry : manifest.channels) {
+    if (entry.output < 0 && ChannelName(entry.map, entry.component) == channel)
+      return ShortText(static_cast<double>(entry.constant), 4);
+  }
+  return kNoValue;
+}
+
+std::string StateText(const std::string& state) {
+  return state == "left_out" ? "left out" : Spaced(state);
+}
 
 }  // namespace
 
@@ -142,6 +157,33 @@ void AddBytesSection(const PageFacts& facts, const std::vector<TextureBytes>& pe
   files.rows.push_back(
       {"what an engine loads", {{""}, {BytesText(total)}, {BytesText(compressed)}}, true});
   AddTable(files, html);
+  html->Close();
+}
+
+void AddEffects(const PageFacts& facts, const char* subject, Html* html) {
+  OpenSection("effects", "What was learned, and what did not have to be", html);
+  Table table;
+  table.caption =
+      "Values are as coded. Savings are against learning it: bytes to load, multiply-adds of one "
+      "lookup, samples of the "
+      "training.";
+  table.heads = {subject, "state", "value", "reason", "bytes", "multiply-adds", "samples"};
+  table.numbers = false;
+  const auto saved = [](uint64_t value, std::string (*text)(double)) {
+    return value > 0 ? text(static_cast<double>(value)) : std::string(kNoValue);
+  };
+  const auto bytes = [](double value) { return BytesText(static_cast<uint64_t>(value)); };
+  for (const ManifestEffect& effect : facts.manifest.effects) {
+    TableRow row{
+        effect.what,
+        {{StateText(effect.state)}, {ConstantOf(facts.manifest, effect.what)}, {effect.reason}}};
+    const ManifestSavings savings = effect.saved.value_or(ManifestSavings());
+    row.cells.push_back({saved(savings.bytes, bytes)});
+    row.cells.push_back({saved(savings.decode_multiply_adds, CountText)});
+    row.cells.push_back({saved(savings.train_samples, CountText)});
+    table.rows.push_back(std::move(row));
+  }
+  AddTable(table, html);
   html->Close();
 }
 

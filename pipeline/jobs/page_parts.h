@@ -31,6 +31,9 @@ void AddTrio(const PageTrio& trio, const std::string& caption, bool texels, Html
 void AddBytesSection(const PageFacts& facts, const std::vector<TextureBytes>& peers,
                      const std::string& how_counted, Html* html);
 
+// The manifest's effects with their savings. subject: the head of the first column.
+void AddEffects(const PageFacts& facts, const char* subject, Html* html);
+
 // Names and values of the training.
 void AddTrainingFacts(const std::vector<std::pair<std::string, std::string>>& facts, Html* html);
 

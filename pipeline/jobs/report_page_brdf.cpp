@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "formats/model_bytes.h"
 #include "pipeline/jobs/package.h"
 #include "pipeline/jobs/page_parts.h"
 #include "pipeline/jobs/page_time.h"
@@ -223,6 +224,7 @@ std::string BrdfReportPage(const PageFacts& facts, const BrdfSource& source,
                   "Against the table that it was made from: three numbers for each colour in the "
                   "file, without headers.",
                   &html);
+  AddEffects(facts, "part of the data", &html);
   AddModel(facts, model, &html);
   return FinishReportPage(facts, std::move(html));
 }

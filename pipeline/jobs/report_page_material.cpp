@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "pipeline/effects/effects.h"
 #include "pipeline/jobs/package.h"
+#include "formats/model_bytes.h"
 #include "pipeline/jobs/page_parts.h"
 #include "pipeline/jobs/page_time.h"
 #include "pipeline/jobs/report_page.h"
@@ -250,46 +250,6 @@ void AddQuality(const PageFacts& facts, const Measurement& measurement, Html* ht
   html->Close().Close().Close();
 }
 
-// What the manifest has in place of a channel that was not learned.
-std::string ConstantOf(const Manifest& manifest, const std::string& channel) {
-  for (const ManifestChannel& entry : manifest.channels) {
-    if (entry.output < 0 && ChannelName(entry.map, entry.component) == channel)
-      return ShortText(static_cast<double>(entry.constant), 4);
-  }
-  return kNoValue;
-}
-
-std::string StateText(const std::string& state) {
-  return state == "left_out" ? "left out" : Spaced(state);
-}
-
-void AddEffects(const PageFacts& facts, Html* html) {
-  OpenSection("effects", "What was learned, and what did not have to be", html);
-  Table table;
-  table.caption =
-      "Values are as coded. Savings are against learning it: bytes to load, multiply-adds of one "
-      "lookup, samples of the "
-      "training.";
-  table.heads = {"channel", "state", "value", "reason", "bytes", "multiply-adds", "samples"};
-  table.numbers = false;
-  const auto saved = [](uint64_t value, std::string (*text)(double)) {
-    return value > 0 ? text(static_cast<double>(value)) : std::string(kNoValue);
-  };
-  const auto bytes = [](double value) { return BytesText(static_cast<uint64_t>(value)); };
-  for (const ManifestEffect& effect : facts.manifest.effects) {
-    TableRow row{
-        effect.what,
-        {{StateText(effect.state)}, {ConstantOf(facts.manifest, effect.what)}, {effect.reason}}};
-    const ManifestSavings savings = effect.saved.value_or(ManifestSavings());
-    row.cells.push_back({saved(savings.bytes, bytes)});
-    row.cells.push_back({saved(savings.decode_multiply_adds, CountText)});
-    row.cells.push_back({saved(savings.train_samples, CountText)});
-    table.rows.push_back(std::move(row));
-  }
-  AddTable(table, html);
-  html->Close();
-}
-
 std::string RuleText(const std::string& rule) {
   if (rule == "list") return "its entry in the list of maps";
   if (rule == "option") return "--color-space, or color_space of the job";
@@ -408,7 +368,7 @@ std::string MaterialReportPage(const PageFacts& facts, const JobSource& source,
                   "computed from 4 \xC3\x97 4 blocks of 8 bytes (BC1, BC4) or 16 (BC5, BC6H, BC7), "
                   "without headers. Maps that are constant count nowhere.",
                   &html);
-  AddEffects(facts, &html);
+  AddEffects(facts, "channel", &html);
   AddInputs(facts, source, &html);
   AddTraining(facts, model, &html);
   return FinishReportPage(facts, std::move(html));

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <utility>
 
+#include "formats/brdf/write_brdf.h"
 #include "formats/decoder/patina_brdf_decoder.h"
 #include "formats/schema_check.h"
 #include "tests/system/child_process.h"
@@ -302,6 +303,53 @@ TEST(BakeBrdf, RefusesDamagedFilesByName) {
     EXPECT_THAT(outcome.err, HasSubstr(name));
     EXPECT_FALSE(fs::exists(folder / ("out/" + fs::path(name).stem().string()))) << name;
   }
+}
+
+// The format has azimuths, the material needs none.
+TEST(BakeBrdf, DoesNotLearnAzimuthsThatChangeNothing) {
+  TempFolder folder;
+  const auto bake = [&](const char* name, const brdf::BrdfFunction& f) {
+    const std::vector<uint8_t> bytes = brdf::EncodeUtia(f);
+    Write(folder / (std::string(name) + ".bin"), std::string(bytes.begin(), bytes.end()));
+    const Outcome baked = Patina({"bake", folder / (std::string(name) + ".bin"), "--out",
+                                  folder / "out", "--quality", "preview", "--json"});
+    EXPECT_EQ(baked.exit_code, 0) << baked.err;
+    const std::string container = LastLine(baked.out)["container"];
+    const Json manifest = Json::parse(ReadAll(container + "/manifest.json"));
+    EXPECT_TRUE(CheckAgainstSchema("manifest", manifest));
+    EXPECT_THAT(Patina({"info", container}).out, HasSubstr("f(wo, wi)"));
+    EXPECT_EQ(Patina({"validate", container}).exit_code, 0);
+    return manifest;
+  };
+  const Json plain =
+      bake("plain", [](const brdf::Direction& wi, const brdf::Direction& wo, float* rgb) {
+        rgb[0] = rgb[1] = rgb[2] = 0.2f + 0.1f * wi.z * wo.z;
+      });
+  EXPECT_TRUE(plain["brdf"]["isotropic"]);
+  ASSERT_EQ(plain["effects"][0]["what"], "azimuth");
+  EXPECT_EQ(plain["effects"][0]["state"], "left_out");
+  EXPECT_THAT(plain["effects"][0]["reason"].get<std::string>(), HasSubstr("counts as isotropic"));
+  for (const char* saving :
+       {"bytes", "decode_multiply_adds", "train_samples", "train_multiply_adds"})
+    EXPECT_GT(plain["effects"][0]["saved"][saving], 0) << saving;
+  const Json sided =
+      bake("sided", [](const brdf::Direction& wi, const brdf::Direction& wo, float* rgb) {
+        rgb[0] = rgb[1] = rgb[2] = 0.2f + 0.1f * wi.x * wi.x + 0.1f * wo.x * wo.x;
+      });
+  EXPECT_FALSE(sided["brdf"]["isotropic"]);
+  EXPECT_EQ(sided["effects"][0]["state"], "learned");
+  const auto loaded = [](const Json& manifest) {
+    uint64_t bytes = 0;
+    for (const Json& payload : manifest["payloads"]) {
+      const std::string role = payload["role"];
+      if (role != "preview" && role != "report") bytes += payload["bytes"].get<uint64_t>();
+    }
+    return bytes;
+  };
+  // What it says it saves is what it saves, but for headers and biases, and codes that are not
+  // used.
+  const double saved = static_cast<double>(loaded(sided) - loaded(plain));
+  EXPECT_NEAR(plain["effects"][0]["saved"]["bytes"].get<double>() / saved, 1, 0.3);
 }
 
 TEST(BakeBrdf, TellsAListOfMeasurementsFromAJob) {
