@@ -33,8 +33,16 @@ MapView::Rgb MapView::Side::Shown(int x, int y) const {
   Rgb rgb{first, first, first};
   if (channels == 2) rgb = {first, Coded(1, x, y), 0};
   if (channels >= 3) rgb = {first, Coded(1, x, y), Coded(2, x, y)};
-  if (kind == MapKind::kLinearColor) {
-    for (float& c : rgb) c = static_cast<float>(LinearToSrgb(c));
+  const bool convert = !same_space && channels == 3 && kind != MapKind::kData;
+  if (kind != MapKind::kLinearColor && !convert) return rgb;
+  std::array<double, 3> linear{rgb[0], rgb[1], rgb[2]};
+  if (kind == MapKind::kSrgbColor) {
+    for (double& c : linear) c = SrgbToLinear(c);
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    const double* m = to_rec709.data() + 3 * c;
+    rgb[c] = static_cast<float>(
+        LinearToSrgb(m[0] * linear[0] + m[1] * linear[1] + m[2] * linear[2]));
   }
   return rgb;
 }
@@ -43,6 +51,8 @@ MapView::MapView(const metrics::QualityMap& map, int width, int height,
                  std::span<const PlanePair> planes)
     : width_(width), height_(height) {
   source_.kind = decoded_.kind = map.kind;
+  source_.to_rec709 = decoded_.to_rec709 = map.to_rec709;
+  source_.same_space = decoded_.same_space = map.to_rec709 == kIdentity3;
   source_.channels = decoded_.channels = std::min(map.channels, 4);
   for (size_t c = 0; c < static_cast<size_t>(source_.channels); ++c) {
     source_.planes[c] = planes[c].reference;

@@ -39,6 +39,8 @@ class MapView {
     std::array<float, 4> constants{};
     int channels = 0;
     metrics::MapKind kind = metrics::MapKind::kData;
+    Matrix3 to_rec709 = kIdentity3;
+    bool same_space = true;
 
     float Coded(int channel, int x, int y) const;
     // As a person is to see it: sRGB-coded.

@@ -98,10 +98,16 @@ Result<Layout> MatchChannels(const std::string& directory, const Decoder& decode
   if (layout.channels.empty()) {
     return Fail(ErrorCode::kConflict, directory + ": it has no map in common with the source");
   }
+  Matrix3 to_rec709 = kIdentity3;
+  if (ParseWorkingSpace(decoder.working_space()) == WorkingSpace::kAcesCg)
+    to_rec709 = *ConversionMatrix(kAp1Primaries, kRec709Primaries);
   size_t first = 0;
   metrics::QualityMap* seen = nullptr;
   for (metrics::QualityMap& map : layout.maps) {
-    map.kind = KindOf(*layout.channels[first].reference, map.channels);
+    const TargetChannel& channel = *layout.channels[first].reference;
+    map.kind = KindOf(channel, map.channels);
+    // Logarithms are looked at as they are.
+    if (channel.encoding != Encoding::kSignedLog) map.to_rec709 = to_rec709;
     first += static_cast<size_t>(map.channels);
     const bool color =
         map.kind == metrics::MapKind::kSrgbColor || map.kind == metrics::MapKind::kLinearColor;

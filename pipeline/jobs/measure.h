@@ -41,7 +41,7 @@ using LevelViewer =
 // base colour, normal, packed set has nine. Overall: from the mean of that over all mips from 0
 // down to 1x1, each mip with the same weight (Weinreich 2024). mean_mips: the mean of the PSNRs of
 // the mips. SSIM, FLIP (of the base colour, or the first colour map) and the angle between normals:
-// mip 0 only, for time; colours of another working space are taken for Rec.709 there.
+// mip 0 only, for time; FLIP of colours as Rec. 709, whatever the working space.
 //
 // viewer: empty, or called for each mip, from the finest on.
 // Errors: kNotFound, kCorruptData, kUnsupported, kResourceExhausted from the decoder; kConflict

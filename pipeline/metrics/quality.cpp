@@ -24,15 +24,16 @@ class FullPlane {
   FullPlane(const FullPlane&) = delete;
   FullPlane& operator=(const FullPlane&) = delete;
 
-  // Replaces linear values by sRGB-coded ones.
-  void EncodeSrgb(ThreadPool& pool) {
-    const size_t width = static_cast<size_t>(view_.width);
-    std::vector<float> coded(width * view_.height);
-    pool.ParallelFor(view_.height, [&](int y, int) {
-      LinearToSrgbRow(view_.Row(y), width, coded.data() + y * width);
-    });
-    storage_ = std::move(coded);
-    view_ = DensePlane(storage_.data(), view_.width, view_.height);
+  // Values that may be changed, row after row.
+  float* Own() {
+    if (storage_.empty()) {
+      const size_t width = static_cast<size_t>(view_.width);
+      storage_.resize(width * view_.height);
+      for (int y = 0; y < view_.height; ++y)
+        std::copy_n(view_.Row(y), width, storage_.data() + y * width);
+      view_ = DensePlane(storage_.data(), view_.width, view_.height);
+    }
+    return storage_.data();
   }
 
   const PlanarView& view() const { return view_; }
@@ -46,12 +47,35 @@ bool IsConstant(const PlanePair& pair) {
   return pair.reference.data == nullptr && pair.test.data == nullptr;
 }
 
+// As sRGB codes of Rec. 709.
+void CodeForDisplay(const QualityMap& map, std::array<FullPlane, 3>* planes, ThreadPool& pool) {
+  const bool same_space = map.channels < 3 || map.to_rec709 == kIdentity3;
+  if (map.kind == MapKind::kSrgbColor && same_space) return;
+  float* rgb[3];
+  for (size_t c = 0; c < 3; ++c) rgb[c] = (*planes)[c].Own();
+  const PlanarView& size = (*planes)[0].view();
+  const size_t width = static_cast<size_t>(size.width);
+  pool.ParallelFor(size.height, [&](int y, int) {
+    float* row[3];
+    for (size_t c = 0; c < 3; ++c) {
+      row[c] = rgb[c] + static_cast<size_t>(y) * width;
+      if (map.kind == MapKind::kSrgbColor) SrgbToLinearRow(row[c], width, row[c]);
+    }
+    for (size_t x = 0; x < width && !same_space; ++x) {
+      const double in[3] = {row[0][x], row[1][x], row[2][x]};
+      for (size_t c = 0; c < 3; ++c) {
+        const double* m = map.to_rec709.data() + 3 * c;
+        row[c][x] = static_cast<float>(m[0] * in[0] + m[1] * in[1] + m[2] * in[2]);
+      }
+    }
+    for (float* values : row) LinearToSrgbRow(values, width, values);
+  });
+}
+
 double MeasureFlip(const QualityMap& map, std::span<const PlanePair> planes, int width, int height,
                    ThreadPool& pool) {
   const auto view = [&](std::array<FullPlane, 3>& full) {
-    if (map.kind == MapKind::kLinearColor) {
-      for (auto& plane : full) plane.EncodeSrgb(pool);
-    }
+    CodeForDisplay(map, &full, pool);
     return RgbView{full[0].view(), full[1].view(), full[2].view()};
   };
   const auto& r = planes[0];

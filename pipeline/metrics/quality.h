@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/base/thread_pool.h"
+#include "pipeline/color/primaries.h"
 #include "pipeline/metrics/plane.h"
 
 namespace patina::metrics {
@@ -15,8 +16,8 @@ namespace patina::metrics {
 // How the planes of a map are to be read.
 enum class MapKind {
   kData,         // any number of channels
-  kSrgbColor,    // 1 or 3 channels, sRGB-coded
-  kLinearColor,  // 1 or 3 channels, linear Rec. 709
+  kSrgbColor,    // 1 or 3 channels, coded by the curve of sRGB
+  kLinearColor,  // 1 or 3 channels, linear
   kNormalXy      // 2 channels, coded x and y; z is reconstructed and counts as a third channel
 };
 
@@ -26,6 +27,9 @@ struct QualityMap {
   MapKind kind = MapKind::kData;
   int channels = 1;   // planes that AddLevel gets for it
   bool flip = false;  // measure FLIP on mip 0 (colour maps only)
+  // Of colour maps with 3 channels: from their linear space to Rec. 709, which FLIP and screens are
+  // made for.
+  Matrix3 to_rec709 = kIdentity3;
 };
 
 // One channel of one mip: coded values of the reference and of what is measured, of the same size.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "pipeline/color/color.h"
 #include "pipeline/metrics/flip.h"
 #include "pipeline/metrics/normal_angle.h"
 #include "pipeline/metrics/psnr.h"
@@ -108,6 +109,33 @@ TEST(QualityMeter, ReadsAGreyColourMapAsThreeEqualChannels) {
   meter.AddLevel(20, 20, planes, pool);
   EXPECT_EQ(meter.Finish().flip,
             MeanFlip({a.View(), a.View(), a.View()}, {b.View(), b.View(), b.View()}, pool));
+}
+
+TEST(QualityMeter, BringsColoursToRec709BeforeFlip) {
+  ThreadPool pool(1);
+  const Matrix3 to_wide = *ConversionMatrix(kRec709Primaries, kAp1Primaries);
+  // The same colours in both spaces, coded.
+  constexpr float kColors[2][3] = {{0.7f, 0.3f, 0.2f}, {0.5f, 0.4f, 0.1f}};
+  std::vector<TestPlane> narrow, wide;
+  for (const auto& color : kColors) {
+    for (int c = 0; c < 3; ++c) {
+      narrow.emplace_back(20, 20, static_cast<float>(LinearToSrgb(static_cast<double>(color[c]))));
+      double in_wide = 0;
+      for (int k = 0; k < 3; ++k)
+        in_wide += to_wide[static_cast<size_t>(3 * c + k)] * static_cast<double>(color[k]);
+      wide.emplace_back(20, 20, static_cast<float>(LinearToSrgb(in_wide)));
+    }
+  }
+  const auto flip = [&](const std::vector<TestPlane>& planes, const Matrix3& matrix) {
+    QualityMeter meter({{"albedo", MapKind::kSrgbColor, 3, true, matrix}});
+    const PlanePair pairs[] = {Pair(planes[0], planes[3]), Pair(planes[1], planes[4]),
+                               Pair(planes[2], planes[5])};
+    meter.AddLevel(20, 20, pairs, pool);
+    return *meter.Finish().flip;
+  };
+  const double right = flip(narrow, kIdentity3);
+  EXPECT_NEAR(flip(wide, *ConversionMatrix(kAp1Primaries, kRec709Primaries)), right, 1e-4);
+  EXPECT_GT(std::abs(flip(wide, kIdentity3) - right), 0.01);
 }
 
 TEST(QualityMeter, CodesLinearColourBeforeFlip) {
