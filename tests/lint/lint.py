@@ -170,8 +170,9 @@ def missing_headers(tree, report):
 def no_throw(tree, report):
     for path in tree.cpp(*TOP_LAYERS):
         for number, line in enumerate(code_only(tree.text(path)).splitlines(), 1):
-            # std::bad_alloc is what `new` throws; an allocator of ours does the same.
-            if re.search(r"\bthrow\b(?!\s+std::bad_alloc\b)", line):
+            # std::bad_alloc is what `new` throws; an allocator of ours does the same. Python's errors are exceptions: those of
+            # pybind11 are how they are raised.
+            if re.search(r"\bthrow\b(?!\s+std::bad_alloc\b)(?!\s+(py|pybind11)::)", line):
                 report(path, number, "we throw no exceptions: return a Result")
 
 

@@ -93,6 +93,9 @@ class LintTest(unittest.TestCase):
     def test_a_failed_allocation_may_throw(self):
         self.assertEqual(self.findings({"formats/ok.cpp": "throw std::bad_alloc();\n"}), [])
 
+    def test_python_errors_may_be_raised(self):
+        self.assertEqual(self.findings({"formats/ok.cpp": "throw py::value_error(text);\n"}), [])
+
     def test_sleep(self):
         self.expect("no_sleep_in_tests", "tests/bad_test.cpp", 1,
                     {"tests/bad_test.cpp": "std::this_thread::sleep_for(1s);\n"})
