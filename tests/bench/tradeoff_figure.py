@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Draws the fronts of a sweep as one SVG, for documents.
 
-    tradeoff_figure.py SWEEP/tradeoff.json FIGURE.svg [--kind material|brdf]
+    tradeoff_figure.py SWEEP/tradeoff.json FIGURE.svg [--kind material|brdf] [--cpu]
 
+--cpu: processor seconds in place of wall seconds, for a sweep on a machine that had other work.
 Three plots side by side: quality against seconds of encoding, bytes and nanoseconds of decoding, each with a logarithmic
 axis; configurations on the front are filled and joined. Standard library only.
 """
@@ -13,6 +14,7 @@ from xml.sax.saxutils import escape
 
 COSTS = (("encode_s", "encode", "seconds to bake"), ("bytes", "bytes", "bytes to load"),
          ("decode_ns", "decode", "ns of a lookup, one core"))
+CPU_COST = ("encode_cpu_s", "cpu", "processor seconds to bake")
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300, 260, 44, 12, 14, 46
 
 STYLE = """text{font:11px system-ui,sans-serif;fill:#1c1b19}.a{stroke:#5d5a54;fill:none}.g{stroke:#dcd8cf}
@@ -61,13 +63,25 @@ def plot(rows, cost, front, label, unit):
     return "".join(out)
 
 
-def figure(sweep, kind):
+def with_front(rows, cost, front):
+    """The rows that no other beats in both quality and cost are on the front."""
+    def beaten(row):
+        return any(other["quality_db"] >= row["quality_db"] and other[cost] <= row[cost] and
+                   (other["quality_db"], -other[cost]) != (row["quality_db"], -row[cost]) for other in rows)
+    return [{**row, "fronts": row["fronts"] + ([] if beaten(row) else [front])} for row in rows]
+
+
+def figure(sweep, kind, cpu=False):
     rows = [row for row in sweep["means"] if row["kind"] == kind and "problem" not in row]
     if not rows:
         raise SystemExit(f"no means of kind {kind}: sweep inputs of that kind first")
+    costs = COSTS
+    if cpu:
+        costs = (CPU_COST, *COSTS[1:])
+        rows = with_front(rows, *CPU_COST[:2])
     unit = "PSNR over all mips, dB" if kind == "material" else "PSNR of the lit sphere, dB"
     plots = "".join(f'<g transform="translate({WIDTH * i} 0)">{plot(rows, cost, front, label, unit)}</g>'
-                    for i, (cost, front, label) in enumerate(COSTS))
+                    for i, (cost, front, label) in enumerate(costs))
     title = f"Quality against encode time, bytes and decode time: means of {rows[0]['inputs']} inputs, {len(rows)} configurations"
     return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {3 * WIDTH} {HEIGHT}" role="img" aria-label="{escape(title)}">'
             f"<title>{escape(title)}</title><style>{STYLE}</style>{plots}</svg>\n")
@@ -78,11 +92,12 @@ def main():
     parser.add_argument("sweep")
     parser.add_argument("figure")
     parser.add_argument("--kind", choices=("material", "brdf"), default="material")
+    parser.add_argument("--cpu", action="store_true")
     options = parser.parse_args()
     with open(options.sweep, encoding="utf-8") as file:
         sweep = json.load(file)
     with open(options.figure, "w", encoding="utf-8") as file:
-        file.write(figure(sweep, options.kind))
+        file.write(figure(sweep, options.kind, options.cpu))
 
 
 if __name__ == "__main__":

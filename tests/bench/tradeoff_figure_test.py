@@ -10,7 +10,7 @@ import tradeoff_figure  # noqa: E402
 
 
 def row(variant, quality, seconds, size, fronts):
-    return {"kind": "material", "variant": variant, "inputs": 2, "quality_db": quality, "encode_s": seconds, "bytes": size,
+    return {"kind": "material", "variant": variant, "inputs": 2, "quality_db": quality, "encode_s": seconds, "encode_cpu_s": 2 * seconds, "bytes": size,
             "decode_ns": 80.0, "fronts": fronts}
 
 
@@ -29,6 +29,14 @@ class Figure(unittest.TestCase):
         self.assertGreater(float(points[0][1]), float(points[1][1]))  # more quality: up
         circles = document.getElementsByTagName("circle")
         self.assertEqual(sum(c.getAttribute("class") == "o" for c in circles), 2 + 1 + 3)
+
+    def test_finds_the_front_of_processor_seconds(self):
+        rows = [row("large", 35, 20, 1, []), row("small", 28, 3, 1, []), row("behind", 27, 9, 1, []), row("twin", 28, 3, 1, [])]
+        fronts = [entry["fronts"] for entry in tradeoff_figure.with_front(rows, "encode_cpu_s", "cpu")]
+        self.assertEqual(fronts, [["cpu"], ["cpu"], [], ["cpu"]])
+        text = tradeoff_figure.figure({"means": rows}, "material", cpu=True)
+        self.assertIn("processor seconds", text)
+        xml.dom.minidom.parseString(text)
 
     def test_one_row_and_none(self):
         xml.dom.minidom.parseString(tradeoff_figure.figure({"means": [row("a", 30, 1, 100, ["encode"])]}, "material"))
