@@ -64,7 +64,9 @@ Json QualityJson(const BrdfMeasurement& measurement, bool is_list) {
   return json;
 }
 
-Json ModelJson(const ManifestBrdf& model) {
+}  // namespace
+
+nlohmann::ordered_json BrdfModelJson(const ManifestBrdf& model) {
   return {{"nside", model.nside},
           {"primitive_size", model.primitive_size},
           {"index_bits", model.index_bits},
@@ -75,8 +77,6 @@ Json ModelJson(const ManifestBrdf& model) {
           {"half_vector_inputs", model.half_vector_inputs},
           {"layers", model.layers}};
 }
-
-}  // namespace
 
 Result<BrdfSource> ReadBrdfSource(const Job& job) {
   // Hashed before and after reading: a file that is still being copied must not get a container
@@ -153,6 +153,20 @@ Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model) {
   return {};
 }
 
+void DescribeBrdfModel(const brdf::ModelShape& shape, int texture_inputs, ManifestBrdf* model) {
+  model->nside = shape.grid.nside;
+  model->primitive_size = shape.primitive_size;
+  model->index_bits = shape.index_bits;
+  model->interpolation = InterpolationName(shape.grid.interpolation);
+  model->isotropic = shape.grid.isotropic;
+  model->canonical_order = shape.grid.canonical_order;
+  model->angle_inputs = shape.grid.angle_inputs;
+  model->half_vector_inputs = shape.grid.half_vector_inputs;
+  model->layers.push_back(2 * shape.primitive_size + shape.grid.extra_inputs() + texture_inputs);
+  model->layers.insert(model->layers.end(), static_cast<size_t>(shape.hidden_layers), shape.hidden);
+  model->layers.push_back(brdf::kOutputs);
+}
+
 Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape,
                       const SharedCodebook& shared) {
   Manifest manifest;
@@ -178,18 +192,8 @@ Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::Mode
   model.grid = kGridName;
   model.shared_codebook_file = shared.file;
   model.shared_codebook_sha256 = shared.sha256;
-  model.nside = shape.grid.nside;
-  model.primitive_size = shape.primitive_size;
-  model.index_bits = shape.index_bits;
-  model.interpolation = InterpolationName(shape.grid.interpolation);
-  model.isotropic = shape.grid.isotropic;
-  model.canonical_order = shape.grid.canonical_order;
-  model.angle_inputs = shape.grid.angle_inputs;
-  model.half_vector_inputs = shape.grid.half_vector_inputs;
   model.network = kWeightsName;
-  model.layers.push_back(2 * shape.primitive_size + shape.grid.extra_inputs());
-  model.layers.insert(model.layers.end(), static_cast<size_t>(shape.hidden_layers), shape.hidden);
-  model.layers.push_back(brdf::kOutputs);
+  DescribeBrdfModel(shape, 0, &model);
   manifest.brdf = std::move(model);
   return manifest;
 }
@@ -233,7 +237,7 @@ std::string BrdfReportToJson(const Manifest& manifest, const std::vector<Manifes
                                     {"effects", described.simulation->effects},
                                     {"left_out", described.simulation->left_out}};
   }
-  json["model"] = ModelJson(described);
+  json["model"] = BrdfModelJson(described);
   json["quality"] = QualityJson(measurement, source.data.table == nullptr);
   json["training"] = {
       {"samples", model.samples},
