@@ -13,6 +13,7 @@
 #include "daemon/base/clock.h"
 #include "daemon/watch/watcher.h"
 #include "pipeline/image/map_groups.h"
+#include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/scene_job.h"
 
 namespace patina::daemon {
@@ -113,11 +114,20 @@ class WatchedFolders : public DropFolders, public AssetSource {
     offer.signature = asset.token;
     offer.failed_folder = asset.path == root ? root : ParentOf(asset.path);
     if (asset.is_file) {
-      offer.job.kind = JobKind::kBrdf;
-      offer.job.file = asset.path;
+      offer.job = JobOfBrdfFile(asset.name, asset.path);
       return {offer};
     }
     std::vector<AssetOffer> offers;
+    const std::vector<std::string> lists = FindImageSets(asset.path);
+    for (const std::string& list : lists) {
+      const std::string name = BrdfAssetName(list);
+      AssetOffer of_list = offer;
+      of_list.job = JobOfBrdfFile(
+          lists.size() == 1 ? asset.name : AssetNameFromPath(asset.name + "_" + name), list);
+      offers.push_back(std::move(of_list));
+    }
+    // Its images are no maps.
+    if (!offers.empty()) return offers;
     std::set<std::string> claimed;
     OfferScenes(root, asset.path, offer, &claimed, &offers);
     offer.job.folder = asset.path;

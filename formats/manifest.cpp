@@ -207,6 +207,14 @@ ordered_json BrdfSourceToJson(const ManifestBrdf& brdf) {
     simulation["effects"] = brdf.simulation->effects;
     simulation["left_out"] = brdf.simulation->left_out;
   }
+  if (brdf.images) {
+    ordered_json& images = json["images"];
+    images["count"] = brdf.images->images;
+    images["width"] = brdf.images->width;
+    images["height"] = brdf.images->height;
+    images["address"] = brdf.images->address;
+    images["sha256"] = brdf.images->sha256;
+  }
   json["files"] = ordered_json::array();
   for (const ManifestBrdfFile& file : brdf.files) {
     ordered_json entry;
@@ -457,6 +465,14 @@ void ReadBrdfSource(const JsonView& json, ManifestBrdf* brdf) {
     names("effects", &read.effects);
     names("left_out", &read.left_out);
   }
+  if (const JsonView images = json.Optional("images")) {
+    ManifestImageSet& read = brdf->images.emplace();
+    read.images = images.Field("count").Unsigned();
+    read.width = images.Field("width").Int(1, kMaxDdsSide);
+    read.height = images.Field("height").Int(1, kMaxDdsSide);
+    read.address = images.Field("address").String();
+    read.sha256 = images.Field("sha256").String();
+  }
   json.Field("files").ForEach(kMaxEntries, [&](const JsonView& entry) {
     brdf->files.push_back({entry.Field("path").String(), entry.Field("sha256").String()});
   });
@@ -550,9 +566,9 @@ Status CheckVersion(const JsonView& json, const JsonProblem& problem) {
                                              "; use a newer patina");
   }
   const std::string kind = json.Field("kind").String();
-  if (problem.text.empty() && kind != "material" && kind != "brdf") {
+  if (problem.text.empty() && kind != "material" && kind != "brdf" && kind != "svbrdf") {
     return Fail(ErrorCode::kUnsupported,
-                "/kind: " + QuoteForMessage(kind) + " is not one of: material, brdf");
+                "/kind: " + QuoteForMessage(kind) + " is not one of: material, brdf, svbrdf");
   }
   return {};
 }
@@ -589,6 +605,7 @@ Result<std::string> ToJson(const Manifest& manifest) {
   json["source"] = manifest.brdf ? BrdfSourceToJson(*manifest.brdf) : SourceToJson(manifest.source);
   json["payloads"] = PayloadsToJson(manifest.payloads);
   if (manifest.brdf) {
+    if (!manifest.features.empty()) json["features"] = FeaturesToJson(manifest.features);
     json["brdf"] = BrdfToJson(*manifest.brdf);
   } else {
     json["features"] = FeaturesToJson(manifest.features);
@@ -645,7 +662,8 @@ Result<Manifest> ParseManifest(std::string_view text) {
   manifest.quality_setting = json.Field("quality_setting").String();
   ReadPayloads(json.Field("payloads"), &manifest.payloads);
   ReadColor(json.Field("color"), &manifest);
-  if (manifest.kind == "brdf") {
+  if (manifest.kind != "material") {
+    if (manifest.kind == "svbrdf") ReadFeatures(json.Field("features"), &manifest.features);
     manifest.brdf.emplace();
     ReadBrdfSource(json.Field("source"), &*manifest.brdf);
     ReadBrdfModel(json.Field("brdf"), &*manifest.brdf);

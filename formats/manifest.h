@@ -233,13 +233,23 @@ struct ManifestSimulation {
   std::vector<std::string> effects, left_out;  // in words
 };
 
-// What a container of kind "brdf" has instead of textures, channels and maps.
+// The measured images that a spatially varying BRDF comes from.
+struct ManifestImageSet {
+  uint64_t images = 0;
+  int width = 0;  // of each, texels
+  int height = 0;
+  std::string address = "clamp";  // "wrap" or "clamp": beyond the edge, of the neural texture
+  std::string sha256;  // of the hex digests of the images' files, one a line, in the list's order
+};
+
+// What a container of kind "brdf" or "svbrdf" has instead of channels and maps.
 struct ManifestBrdf {
   // The source.
   std::string source_format;   // "merl", "rgl", "utia", "sparse", "layered", ...
   uint64_t cells = 0;          // colours in the file
   uint64_t invalid_cells = 0;  // of those, the ones that were left out
   std::optional<ManifestSimulation> simulation;  // of a layered material
+  std::optional<ManifestImageSet> images;        // of kind "svbrdf", and only there
   std::vector<ManifestBrdfFile> files;
   // The model; what repeats the index pack's header is the same as there.
   std::string grid;      // name of the payload of role "grid"
@@ -269,7 +279,7 @@ struct ManifestBrdf {
 struct Manifest {
   // format "patina-container" and format_version kManifestVersion are written by ToJson and checked
   // by ParseManifest.
-  std::string kind = "material";  // or "brdf"
+  std::string kind = "material";  // or "brdf", or "svbrdf": a BRDF with a neural texture
   std::string asset;
   ManifestTool tool;
   std::string fingerprint;  // hex SHA-256 of recipe, job and input hashes
@@ -278,14 +288,16 @@ struct Manifest {
   std::string quality_setting = "standard";  // "preview", "standard", "reference"
   ManifestSource source;                     // [material]
   std::vector<ManifestPayload> payloads;
-  std::vector<ManifestFeature> features;   // [material] empty when every channel is constant
+  // [material] empty when every channel is constant. Of kind "svbrdf": the neural texture, all of
+  // the images' size; its values are the last inputs of the network, three of each texture.
+  std::vector<ManifestFeature> features;
   std::optional<ManifestNetwork> network;  // [material] likewise
   std::vector<ManifestChannel> channels;   // [material]
   std::vector<ManifestMap> maps;           // [material]
   // [material] The mips of the source that are stored; absent: all.
   std::optional<std::array<int, 2>> lod_range;
   std::optional<SceneLook> scene;            // [material] if it comes from a scene
-  std::optional<ManifestBrdf> brdf;          // of kind "brdf", and only there
+  std::optional<ManifestBrdf> brdf;          // of kinds "brdf" and "svbrdf", and only there
   std::string working_space = "lin_rec709";  // of physical colour values; or "acescg"
   std::optional<ManifestColorConfig> color_config;  // [material] absent before 0.2
   ManifestQuality quality;                          // [material]

@@ -140,7 +140,7 @@ Status CheckReference(const Pointer& pointer, const Manifest& manifest, const st
   return {};
 }
 
-Status CheckModel(const Manifest& manifest) {
+Status CheckFeatures(const Manifest& manifest) {
   if (manifest.features.size() > static_cast<size_t>(kMaxManifestFeatures)) {
     return Bad("/features", std::to_string(manifest.features.size()) + " textures, more than 16");
   }
@@ -154,6 +154,11 @@ Status CheckModel(const Manifest& manifest) {
     PATINA_TRY(
         OneOf(at + "/format", feature.format, {"BC6H_UF16", "BC6H_SF16"}, ErrorCode::kUnsupported));
   }
+  return {};
+}
+
+Status CheckModel(const Manifest& manifest) {
+  PATINA_TRY(CheckFeatures(manifest));
   if (!manifest.network) {
     if (!manifest.features.empty()) return Bad("/features", "feature textures without a network");
     return {};
@@ -368,12 +373,35 @@ Status CheckBrdfCodebook(const Manifest& manifest, const ManifestBrdf& brdf) {
   return HexDigest("/brdf/codebook/sha256", brdf.shared_codebook_sha256);
 }
 
-Status CheckBrdf(const Manifest& manifest) {
-  if (!manifest.brdf) return Bad("/brdf", "missing in a manifest of kind \"brdf\"");
-  if (!manifest.features.empty() || manifest.network || !manifest.channels.empty() ||
-      !manifest.maps.empty()) {
-    return Bad("/kind", "\"brdf\" with feature textures, a network, channels or maps");
+// What a spatially varying BRDF has more than another one.
+Status CheckNeuralTexture(const Manifest& manifest) {
+  const ManifestBrdf& brdf = *manifest.brdf;
+  if (manifest.kind != "svbrdf") {
+    if (brdf.images) return Bad("/source/images", "in a manifest of kind \"brdf\"");
+    if (!manifest.features.empty())
+      return Bad("/kind", "\"brdf\" with feature textures, which \"svbrdf\" has");
+    return {};
   }
+  if (!brdf.images) return Bad("/source/images", "missing in a manifest of kind \"svbrdf\"");
+  const ManifestImageSet& images = *brdf.images;
+  if (images.images == 0) return Bad("/source/images/count", "no image");
+  PATINA_TRY(InRange("/source/images/width", images.width, 1, kMaxDdsSide));
+  PATINA_TRY(InRange("/source/images/height", images.height, 1, kMaxDdsSide));
+  PATINA_TRY(
+      OneOf("/source/images/address", images.address, {"wrap", "clamp"}, ErrorCode::kUnsupported));
+  PATINA_TRY(HexDigest("/source/images/sha256", images.sha256));
+  if (manifest.features.empty()) return Bad("/features", "no texture in a spatially varying BRDF");
+  return CheckFeatures(manifest);
+}
+
+Status CheckBrdf(const Manifest& manifest) {
+  if (!manifest.brdf)
+    return Bad("/brdf", "missing in a manifest of kind \"" + manifest.kind + "\"");
+  if (manifest.network || !manifest.channels.empty() || !manifest.maps.empty() ||
+      manifest.lod_range) {
+    return Bad("/kind", "\"" + manifest.kind + "\" with a network, channels, maps or a lod_range");
+  }
+  PATINA_TRY(CheckNeuralTexture(manifest));
   const ManifestBrdf& brdf = *manifest.brdf;
   PATINA_TRY(NotEmpty("/source/format", brdf.source_format));
   if (brdf.invalid_cells > brdf.cells)
@@ -406,8 +434,9 @@ Status CheckBrdf(const Manifest& manifest) {
   if (brdf.rollbacks < 0) return Bad("/brdf/rollbacks", "negative");
   if (brdf.half_vector_inputs && !brdf.angle_inputs)
     return Bad("/brdf/half_vector_inputs", "true without angle_inputs");
-  const int inputs =
-      2 * brdf.primitive_size + (brdf.angle_inputs ? 3 : 0) + (brdf.half_vector_inputs ? 2 : 0);
+  const int inputs = 2 * brdf.primitive_size + (brdf.angle_inputs ? 3 : 0) +
+                     (brdf.half_vector_inputs ? 2 : 0) +
+                     3 * static_cast<int>(manifest.features.size());
   if (brdf.layers.front() != inputs || brdf.layers.back() != 3) {
     return Bad("/brdf/network/layers", std::to_string(brdf.layers.front()) + " inputs and " +
                                            std::to_string(brdf.layers.back()) + " outputs, not " +
@@ -437,7 +466,8 @@ Status CheckMaterial(const Manifest& manifest) {
 }  // namespace
 
 Status CheckManifest(const Manifest& manifest) {
-  PATINA_TRY(OneOf("/kind", manifest.kind, {"material", "brdf"}, ErrorCode::kUnsupported));
+  PATINA_TRY(
+      OneOf("/kind", manifest.kind, {"material", "brdf", "svbrdf"}, ErrorCode::kUnsupported));
   if (auto status = CheckPlainName(manifest.asset, "/asset: asset name"); !status) return status;
   PATINA_TRY(NotEmpty("/tool/name", manifest.tool.name));
   PATINA_TRY(NotEmpty("/tool/version", manifest.tool.version));
@@ -459,7 +489,7 @@ Status CheckManifest(const Manifest& manifest) {
         !status && config.source != "builtin")
       return status;
   }
-  return manifest.kind == "brdf" ? CheckBrdf(manifest) : CheckMaterial(manifest);
+  return manifest.kind == "material" ? CheckMaterial(manifest) : CheckBrdf(manifest);
 }
 
 }  // namespace patina

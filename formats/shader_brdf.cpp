@@ -64,6 +64,25 @@ std::vector<uint8_t> IndexTexels(const CornerTable& table, size_t bytes_each) {
   return bytes;
 }
 
+// What a spatially varying BRDF has besides: textures of one size, sampled at one level.
+Status DraftNeuralTexture(ShaderDraft* draft, int first_feature, ShaderConstants* constants) {
+  const Manifest& manifest = draft->container.manifest;
+  std::string declarations, samples;
+  for (size_t t = 0; t < manifest.features.size(); ++t) {
+    PATINA_ASSIGN(const std::string declaration, AddFeatureTexture(draft, t));
+    declarations += declaration;
+    const std::string index = std::to_string(t);
+    samples += " PATINA_BRDF_FEATURE(" + index + ", patina_feature_" + index + ")";
+  }
+  const float top[] = {static_cast<float>(manifest.features[0].levels - 1)};
+  draft->Define("TEXTURES", declarations);
+  draft->Define("SAMPLES", samples);
+  draft->Define("FIRST_FEATURE", first_feature);
+  draft->Define("TOP", constants->AddVectors(top));
+  draft->bindings["address"] = manifest.brdf->images->address;
+  return {};
+}
+
 }  // namespace
 
 Status DraftBrdf(ShaderDraft* draft) {
@@ -104,8 +123,15 @@ Status DraftBrdf(ShaderDraft* draft) {
   PATINA_ASSIGN(const WeightBuffer buffer, ReadWeights(path));
   auto layers = MatchNetwork(container.manifest, buffer);
   if (!layers) return Fail(std::move(layers).error(), path);
+  // Each texture of a neural texture has a vector.
+  const size_t textures = container.manifest.features.size();
+  const int first_feature = 2 * k4 + (scalars + 3) / 4;
+  for (size_t t = 0; t < textures; ++t) {
+    for (int c = 0; c < 3; ++c) slots.push_back(4 * (first_feature + static_cast<int>(t)) + c);
+  }
   ShaderConstants constants;
-  constants.AddLayers(*layers, slots, 2 * k4 + (scalars + 3) / 4);
+  constants.AddLayers(*layers, slots, first_feature + static_cast<int>(textures));
+  if (textures > 0) PATINA_TRY(DraftNeuralTexture(draft, first_feature, &constants));
   draft->Define("WIDTH4", constants.width4());
   return draft->AddConstants(constants);
 }

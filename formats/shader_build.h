@@ -34,6 +34,10 @@ struct ShaderDraft {
   int next_binding() const { return options.first_binding + static_cast<int>(textures.size()); }
 };
 
+// Checks and lists a feature texture of the container; returns its PATINA_TEXTURE(name, binding).
+// Errors: those of ReadDds and MatchTexture.
+Result<std::string> AddFeatureTexture(ShaderDraft* draft, size_t index);
+
 Status DraftMaterial(ShaderDraft* draft);
 Status DraftBrdf(ShaderDraft* draft);
 

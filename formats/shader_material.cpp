@@ -33,6 +33,19 @@ void ListTexture(ShaderDraft* draft, const ManifestFeature& feature, size_t inde
                              {"levels", feature.levels}});
 }
 
+}  // namespace
+
+Result<std::string> AddFeatureTexture(ShaderDraft* draft, size_t index) {
+  const ManifestFeature& feature = draft->container.manifest.features[index];
+  PATINA_TRY(CheckTexture(draft->container, feature));
+  const std::string declaration = " PATINA_TEXTURE(patina_feature_" + std::to_string(index) + ", " +
+                                  std::to_string(draft->next_binding()) + ")";
+  ListTexture(draft, feature, index);
+  return declaration;
+}
+
+namespace {
+
 // PATINA_MATERIAL_GROUPS: the samples of four textures at a time.
 std::string Groups(size_t textures) {
   std::string text;
@@ -60,10 +73,8 @@ Status DraftNetwork(ShaderDraft* draft) {
   std::vector<float> bias, top;
   for (size_t i = 0; i < manifest.features.size(); ++i) {
     const ManifestFeature& feature = manifest.features[i];
-    PATINA_TRY(CheckTexture(draft->container, feature));
-    declarations += " PATINA_TEXTURE(patina_feature_" + std::to_string(i) + ", " +
-                    std::to_string(draft->next_binding()) + ")";
-    ListTexture(draft, feature, i);
+    PATINA_ASSIGN(const std::string declaration, AddFeatureTexture(draft, i));
+    declarations += declaration;
     bias.push_back(static_cast<float>(feature.lod_bias));
     top.push_back(static_cast<float>(feature.levels - 1));
   }

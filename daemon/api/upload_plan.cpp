@@ -32,6 +32,9 @@ class UploadPlanner {
     // All scenes first: one may own textures of any folder.
     for (const std::string& folder : folders_) AddScenes(folder);
     for (const std::string& folder : folders_) {
+      const std::vector<std::string> lists = FindImageSets(folder);
+      for (const std::string& list : lists) Add(JobOfBrdfFile(BrdfAssetName(list), list), list);
+      if (!lists.empty()) continue;  // its images are no maps
       AddSets(folder);
       AddBrdfs(folder);
     }
@@ -97,11 +100,7 @@ class UploadPlanner {
     const auto files = FindBrdfFiles(folder);
     if (!files) return;
     for (const std::string& file : *files) {
-      Job job;
-      job.kind = JobKind::kBrdf;
-      job.asset = BrdfAssetName(file);
-      job.file = file;
-      Add(std::move(job), file);
+      Add(JobOfBrdfFile(BrdfAssetName(file), file), file);
     }
   }
 

@@ -19,6 +19,7 @@
 #include "formats/base/names.h"
 #include "formats/base/sha256.h"
 #include "pipeline/jobs/brdf_job.h"
+#include "pipeline/jobs/svbrdf_job.h"
 
 namespace patina::daemon {
 namespace {
@@ -53,7 +54,9 @@ Status CheckLimit(const char* name, std::optional<int64_t> value) {
 
 // What decides the result besides the source's files.
 std::string RecipeTag(const Job& job) {
-  const int version = job.kind == JobKind::kBrdf ? kBrdfRecipeVersion : kRecipeVersion;
+  const int version = job.kind == JobKind::kBrdf     ? kBrdfRecipeVersion
+                      : job.kind == JobKind::kSvbrdf ? kSvbrdfRecipeVersion
+                                                     : kRecipeVersion;
   return std::string(JobKindName(job.kind)) + " recipe " + std::to_string(version) + "\n" +
          CanonicalJob(job) + "\n" + job.folder + "\n" + job.set + "\n" + job.file + "\n" +
          (job.scene.empty() ? "" : job.scene + "\n" + job.scene_material + "\n") +
@@ -61,7 +64,7 @@ std::string RecipeTag(const Job& job) {
 }
 
 std::string SourceOf(const Job& job) {
-  if (job.kind == JobKind::kBrdf) return job.file;
+  if (job.kind != JobKind::kMaterial) return job.file;
   if (!job.scene.empty()) return job.scene;
   return job.folder.empty() && !job.maps.empty() ? job.maps[0].file : job.folder;
 }

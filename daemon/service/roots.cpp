@@ -59,7 +59,8 @@ bool LiesWithin(const std::string& path, const std::vector<std::string>& folders
 
 Status ConfineJob(const Roots& roots, Job* job) {
   PATINA_TRY(Confine("/out", roots.output, "output_roots", &job->out));
-  if (job->kind == JobKind::kBrdf) return Confine("/file", roots.input, "input_roots", &job->file);
+  if (job->kind != JobKind::kMaterial)
+    return Confine("/file", roots.input, "input_roots", &job->file);
   if (!job->folder.empty())
     PATINA_TRY(Confine("/folder", roots.input, "input_roots", &job->folder));
   if (!job->scene.empty()) PATINA_TRY(Confine("/scene", roots.input, "input_roots", &job->scene));

@@ -15,6 +15,7 @@
 #include "formats/layered/layered_file.h"
 #include "formats/scene/scene.h"
 #include "pipeline/image/map_name.h"
+#include "pipeline/svbrdf/image_set.h"
 
 namespace patina::daemon {
 namespace {
@@ -82,8 +83,9 @@ FileRole RoleOfFile(std::string_view name) {
     return FileRole::kNone;
   if (IsHiddenName(name)) return FileRole::kOther;
   const std::string text(name);
-  // A scene is baked with the images beside it.
-  if (HasImageExtension(text) || IsSceneFileName(text)) return FileRole::kImage;
+  // A scene or a list of images is baked with the images beside it.
+  if (HasImageExtension(text) || IsSceneFileName(text) || svbrdf::IsImageSetFileName(text))
+    return FileRole::kImage;
   return brdf::HasBrdfExtension(text) ? FileRole::kBrdf : FileRole::kOther;
 }
 

@@ -320,7 +320,7 @@ class BrdfDecoder {
     Failure failure;
     bool good = false;
     try {
-      good = loaded.LoadAll(path, &failure);
+      good = loaded.LoadAll(path, "brdf", 0, &failure);
     } catch (const std::exception& error) {
       failure.Set(LoadStatus::kCorrupt, path + ": " + error.what());
     }
@@ -334,6 +334,43 @@ class BrdfDecoder {
 
   // f(wi, wo), each channel finite and at least 0; zero unless both are above the horizon.
   void Evaluate(const float wi[3], const float wo[3], float rgb[3]) const {
+    Run(wi, wo, nullptr, rgb);
+  }
+
+  // Draws wo for wi from three numbers in [0, 1). Returns false if the sample is lost: it goes
+  // below the horizon and counts as a sample of value zero. An estimate of the reflected light is f
+  // cos / pdf. Without a sampler in the container: cosine-weighted.
+  bool Sample(const float wi[3], const float u[3], float wo[3], float* pdf) const {
+    return sampler_.Sample(wi, u, wo, pdf);
+  }
+  // The density of Sample, per solid angle of wo.
+  float Pdf(const float wi[3], const float wo[3]) const { return sampler_.Pdf(wi, wo); }
+  bool has_sampler() const { return has_sampler_; }
+
+  bool isotropic() const { return isotropic_; }
+  int nside() const { return nside_; }
+  int primitive_size() const { return static_cast<int>(k_); }
+
+ private:
+  friend class SvbrdfDecoder;  // which adds a neural texture
+
+  static constexpr size_t kMaxWidth = 512;  // of a layer, inputs included
+  static constexpr size_t kMaxLayers = 16;
+  static constexpr uint64_t kMaxFileBytes = uint64_t{1} << 26;
+  static constexpr uint64_t kMaxFloats = uint64_t{1} << 28;
+
+  struct Failure {
+    LoadStatus status = LoadStatus::kCorrupt;
+    std::string text;
+    bool Set(LoadStatus new_status, std::string new_text) {
+      status = new_status;
+      text = std::move(new_text);
+      return false;
+    }
+  };
+
+  // texture: texture_inputs_ values.
+  void Run(const float wi[3], const float wo[3], const float* texture, float rgb[3]) const {
     using namespace brdf_decoder_detail;
     rgb[0] = rgb[1] = rgb[2] = 0;
     if (!(wi[2] > 0) || !(wo[2] > 0) || layers_.empty()) return;
@@ -344,6 +381,7 @@ class BrdfDecoder {
     float y[kMaxWidth];
     if (angle_inputs_) AngleInputs(a, b, x + 2 * k_);
     if (half_vector_inputs_) HalfVectorInputs(a, b, x + 2 * k_ + 3);
+    std::copy(texture, texture + texture_inputs_, x + layers_[0].inputs - texture_inputs_);
     if (isotropic_) Fold(a, b);
     Feature(0, a, x);
     Feature(1, b, x + k_);
@@ -365,36 +403,6 @@ class BrdfDecoder {
     // NaN, which only absurd weights can give, becomes 0.
     for (int c = 0; c < 3; ++c) rgb[c] = from[c] > 0 ? std::expm1(std::min(from[c], 12.0f)) : 0.0f;
   }
-
-  // Draws wo for wi from three numbers in [0, 1). Returns false if the sample is lost: it goes
-  // below the horizon and counts as a sample of value zero. An estimate of the reflected light is f
-  // cos / pdf. Without a sampler in the container: cosine-weighted.
-  bool Sample(const float wi[3], const float u[3], float wo[3], float* pdf) const {
-    return sampler_.Sample(wi, u, wo, pdf);
-  }
-  // The density of Sample, per solid angle of wo.
-  float Pdf(const float wi[3], const float wo[3]) const { return sampler_.Pdf(wi, wo); }
-  bool has_sampler() const { return has_sampler_; }
-
-  bool isotropic() const { return isotropic_; }
-  int nside() const { return nside_; }
-  int primitive_size() const { return static_cast<int>(k_); }
-
- private:
-  static constexpr size_t kMaxWidth = 512;  // of a layer, inputs included
-  static constexpr size_t kMaxLayers = 16;
-  static constexpr uint64_t kMaxFileBytes = uint64_t{1} << 26;
-  static constexpr uint64_t kMaxFloats = uint64_t{1} << 28;
-
-  struct Failure {
-    LoadStatus status = LoadStatus::kCorrupt;
-    std::string text;
-    bool Set(LoadStatus new_status, std::string new_text) {
-      status = new_status;
-      text = std::move(new_text);
-      return false;
-    }
-  };
 
   // X, Y of FORMATS.md, "BRDF": where the half vector lies.
   static void HalfVectorInputs(const float a[3], const float b[3], float out[2]) {
@@ -500,8 +508,10 @@ class BrdfDecoder {
     return true;
   }
 
-  bool LoadAll(const std::string& path, Failure* failure) {
+  bool LoadAll(const std::string& path, const std::string& kind, size_t texture_inputs,
+               Failure* failure) {
     using namespace brdf_decoder_detail;
+    texture_inputs_ = texture_inputs;
     std::string directory = path;
     if (!std::ifstream(directory + "/manifest.json")) directory += "/current";
     const std::string manifest_path = directory + "/manifest.json";
@@ -522,7 +532,7 @@ class BrdfDecoder {
       return corrupt("/format_version is not a positive integer");
     if (version.get<uint64_t>() > 1)
       return unsupported("/format_version is newer than this decoder");
-    if (Text(Member(manifest, "kind")) != "brdf") return unsupported("/kind is not \"brdf\"");
+    if (Text(Member(manifest, "kind")) != kind) return unsupported("/kind is not \"" + kind + "\"");
     const nlohmann::json& brdf = Member(manifest, "brdf");
     if (Text(Member(brdf, "output_transform")) != "expm1")
       return unsupported("/brdf/output_transform is not \"expm1\"");
@@ -689,7 +699,8 @@ class BrdfDecoder {
       }
       return corrupt("there is no tensor " + name);
     };
-    size_t inputs = 2 * k_ + (angle_inputs_ ? 3 : 0) + (half_vector_inputs_ ? 2 : 0);
+    size_t inputs =
+        2 * k_ + (angle_inputs_ ? 3 : 0) + (half_vector_inputs_ ? 2 : 0) + texture_inputs_;
     for (size_t l = 0; l < count / 2; ++l) {
       const std::string name = "layer" + std::to_string(l);
       uint32_t shape[2], bias_shape[2];
@@ -739,6 +750,7 @@ class BrdfDecoder {
   bool canonical_order_ = true;
   bool angle_inputs_ = true;
   bool half_vector_inputs_ = false;
+  size_t texture_inputs_ = 0;    // of a spatially varying BRDF, the last of the network's inputs
   std::vector<float> features_;  // [hemisphere][corner][k]
   std::vector<brdf_decoder_detail::Layer> layers_;
   BrdfSampler sampler_;

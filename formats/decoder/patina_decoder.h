@@ -520,6 +520,8 @@ class Decoder {
   }
 
  private:
+  friend class SvbrdfDecoder;  // whose neural texture is one of this kind
+
   static constexpr int kLanes = 16;
 
   struct Failure {

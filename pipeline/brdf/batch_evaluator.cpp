@@ -22,7 +22,7 @@ Error BadNetwork(const std::string& what) {
 
 Result<BatchEvaluator> BatchEvaluator::Create(const IndexPack& pack,
                                               const std::vector<float>& features,
-                                              const WeightBuffer& network) {
+                                              const WeightBuffer& network, int texture_inputs) {
   PATINA_ASSIGN(const SimdTarget target, ActiveSimdTarget());
   BatchEvaluator evaluator;
   evaluator.kernels_ = &KernelsFor(target);
@@ -35,7 +35,7 @@ Result<BatchEvaluator> BatchEvaluator::Create(const IndexPack& pack,
   const int hidden = static_cast<int>(first->shape[0]);
   if (hidden > 256) return Fail(BadNetwork("more than 256 hidden units"));
   evaluator.layout_ = std::make_unique<NetworkLayout>(
-      pack.primitive_size, evaluator.grid_.extra_inputs(), hidden, layers - 1);
+      pack.primitive_size, evaluator.grid_.extra_inputs(), hidden, layers - 1, texture_inputs);
   const NetworkLayout& layout = *evaluator.layout_;
   evaluator.parameters_.Reset(layout.parameter_count);
   for (int l = 0; l < layers; ++l) {
@@ -44,7 +44,8 @@ Result<BatchEvaluator> BatchEvaluator::Create(const IndexPack& pack,
     const WeightTensor *weight = FindTensor(network, name + ".weight"),
                        *bias = FindTensor(network, name + ".bias");
     const uint32_t outputs = l + 1 < layers ? hidden : kOutputs;
-    const uint32_t inputs = l == 0 ? 2 * pack.primitive_size + layout.extra_inputs : hidden;
+    const uint32_t inputs =
+        l == 0 ? 2 * pack.primitive_size + layout.extra_inputs + texture_inputs : hidden;
     if (weight == nullptr || weight->shape != std::vector<uint32_t>{outputs, inputs})
       return Fail(BadNetwork(name + ".weight has another shape"));
     if (bias == nullptr || bias->shape != std::vector<uint32_t>{outputs})
@@ -54,7 +55,11 @@ Result<BatchEvaluator> BatchEvaluator::Create(const IndexPack& pack,
         uint32_t column = i;  // features are padded to whole vectors
         if (l == 0) {
           const uint32_t k = pack.primitive_size, stride = layout.feature_stride;
-          column = i < k ? i : i < 2 * k ? stride + i - k : 2 * stride + i - 2 * k;
+          const uint32_t scalars = 2 * k + layout.extra_inputs;
+          column = i < k         ? i
+                   : i < 2 * k   ? stride + i - k
+                   : i < scalars ? layout.feature_columns() + i - 2 * k
+                                 : 2 * stride + i - scalars;
         }
         evaluator.parameters_[layer.weights + static_cast<size_t>(column) * layer.outputs + o] =
             HalfToFloat(weight->elements[static_cast<size_t>(o) * inputs + i]);
@@ -80,7 +85,7 @@ void BatchEvaluator::FoldFirstLayer() {
   const DenseLayer& first = layout_->layers[0];
   const size_t stride = layout_->feature_stride, corners = features_.size() / stride,
                columns = first.outputs;
-  if (corners * columns > kMostFloats) return;
+  if (corners * columns > kMostFloats || layout_->texture_inputs > 0) return;
   folded_.Reset(corners * columns);
   for (size_t c = 0; c < corners; ++c) {
     const size_t side = c < corners / 2 ? 0 : 1;
@@ -116,7 +121,8 @@ void BatchEvaluator::LookUp(const Direction* wi, const Direction* wo, int count,
   }
 }
 
-void BatchEvaluator::ForwardUnfolded(int count, Scratch* scratch) const {
+void BatchEvaluator::ForwardUnfolded(int count, const float* texture, const TexelTaps* taps,
+                                     Scratch* scratch) const {
   const PairLookups& pairs = scratch->pairs_[0];
   for (int s = 0; s < count; ++s) {
     PoolSample& sample = scratch->samples_[s];
@@ -130,11 +136,14 @@ void BatchEvaluator::ForwardUnfolded(int count, Scratch* scratch) const {
   task.features = features_.data();
   task.samples = scratch->samples_.data();
   task.count = count;
+  task.texture = texture;
+  task.taps = taps;
   kernels_->forward_chunk(task, &scratch->chunk_);
 }
 
 void BatchEvaluator::Evaluate(Scratch* scratch, size_t count, const Direction* wi,
-                              const Direction* wo, float* rgb) const {
+                              const Direction* wo, float* rgb, const float* texture,
+                              const TexelTaps* taps) const {
   for (size_t first = 0; first < count; first += kChunkRows) {
     const int used = static_cast<int>(std::min<size_t>(kChunkRows, count - first));
     LookUp(wi + first, wo + first, used, &scratch->pairs_[0]);
@@ -142,7 +151,7 @@ void BatchEvaluator::Evaluate(Scratch* scratch, size_t count, const Direction* w
       kernels_->evaluate_chunk(*layout_, parameters_.data(), folded_.data(), scratch->pairs_[0],
                                &scratch->chunk_);
     } else {
-      ForwardUnfolded(used, scratch);
+      ForwardUnfolded(used, texture, taps == nullptr ? nullptr : taps + first, scratch);
     }
     kernels_->output_values(scratch->chunk_.outputs.data(), wi + first, wo + first, used,
                             rgb + first * kOutputs);

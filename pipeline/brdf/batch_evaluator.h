@@ -27,15 +27,16 @@ class BatchEvaluator {
     AlignedBuffer<PoolSample> samples_;  // of a chunk; empty if corners are folded
   };
 
-  // features: as ExpandCorners gives them. Errors: kCorruptData (tensors that do not fit the pack
-  // or each other), kUnsupported (CPU).
+  // features: as ExpandCorners gives them. texture_inputs: of a spatially varying BRDF. Errors:
+  // kCorruptData (tensors that do not fit the pack or each other), kUnsupported (CPU).
   static Result<BatchEvaluator> Create(const IndexPack& pack, const std::vector<float>& features,
-                                       const WeightBuffer& network);
+                                       const WeightBuffer& network, int texture_inputs = 0);
 
   // f of `count` pairs of unit vectors, rgb [count][3]; zero where a direction is not above the
-  // horizon. Any count.
+  // horizon. Any count. With texture inputs: texture (rows of layout().texture_stride floats) and
+  // the taps of each pair.
   void Evaluate(Scratch* scratch, size_t count, const Direction* wi, const Direction* wo,
-                float* rgb) const;
+                float* rgb, const float* texture = nullptr, const TexelTaps* taps = nullptr) const;
 
   const NetworkLayout& layout() const { return *layout_; }
 
@@ -44,7 +45,8 @@ class BatchEvaluator {
 
   void FoldFirstLayer();
   void LookUp(const Direction* wi, const Direction* wo, int count, PairLookups* pairs) const;
-  void ForwardUnfolded(int count, Scratch* scratch) const;
+  void ForwardUnfolded(int count, const float* texture, const TexelTaps* taps,
+                       Scratch* scratch) const;
 
   const BrdfKernels* kernels_ = nullptr;
   GridShape grid_;

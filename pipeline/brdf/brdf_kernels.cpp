@@ -13,10 +13,13 @@ extern const brdf::BrdfKernels kBrdfKernels;
 
 namespace brdf {
 
-NetworkLayout::NetworkLayout(int primitive_size_, int extra_inputs_, int hidden_, int hidden_layers)
+NetworkLayout::NetworkLayout(int primitive_size_, int extra_inputs_, int hidden_, int hidden_layers,
+                             int texture_inputs_)
     : primitive_size(primitive_size_),
       feature_stride(PadTo16(primitive_size_)),
       extra_inputs(extra_inputs_),
+      texture_inputs(texture_inputs_),
+      texture_stride(PadTo16(texture_inputs_)),
       hidden(hidden_) {
   int inputs = input_columns();
   for (int l = 0; l <= hidden_layers; ++l) {
@@ -35,7 +38,7 @@ NetworkLayout::NetworkLayout(int primitive_size_, int extra_inputs_, int hidden_
 
 double NetworkLayout::ForwardMacs() const {
   const int hidden_layers = static_cast<int>(layers.size()) - 1;
-  const double inputs = 2.0 * primitive_size + extra_inputs;
+  const double inputs = 2.0 * primitive_size + texture_inputs + extra_inputs;
   return inputs * hidden + static_cast<double>(hidden_layers - 1) * hidden * hidden +
          static_cast<double>(hidden) * kOutputs;
 }
@@ -53,7 +56,7 @@ ChunkScratch::ChunkScratch(const NetworkLayout& layout) : outputs(kChunkRows * 1
 
 ChunkResult::ChunkResult(const NetworkLayout& layout)
     : weight_gradient(layout.parameter_count),
-      feature_gradient(static_cast<size_t>(kChunkRows) * 2 * layout.feature_stride) {}
+      feature_gradient(static_cast<size_t>(kChunkRows) * layout.feature_columns()) {}
 
 const BrdfKernels& KernelsFor(SimdTarget target) {
   return target == SimdTarget::kAvx512 ? simd_avx512::kBrdfKernels : simd_avx2::kBrdfKernels;

@@ -38,20 +38,25 @@ struct DenseLayer {
       0;  // offset of its transpose [outputs][PadTo16(inputs)], in an array of its own
 };
 
-// Where everything lies. Input columns: features of wi [stride], of wo [stride], then the extra
-// inputs.
+// Where everything lies. Input columns: features of wi [feature_stride], of wo [feature_stride], of
+// the neural texture [texture_stride], then the extra inputs.
 struct NetworkLayout {
-  NetworkLayout(int primitive_size, int extra_inputs, int hidden, int hidden_layers);
+  NetworkLayout(int primitive_size, int extra_inputs, int hidden, int hidden_layers,
+                int texture_inputs = 0);
 
   int primitive_size;  // k
   int feature_stride;  // k rounded up to 16: floats between rows of features
   int extra_inputs;    // 0, 3 or 5
+  int texture_inputs;  // of a spatially varying BRDF, else 0
+  int texture_stride;  // texture_inputs rounded up to 16: floats between rows of texels
   int hidden;
   std::vector<DenseLayer> layers;
   size_t parameter_count = 0;
   size_t transposed_count = 0;
 
-  int input_columns() const { return 2 * feature_stride + extra_inputs; }
+  // What a sample looks up, and what gets a gradient.
+  int feature_columns() const { return 2 * feature_stride + texture_stride; }
+  int input_columns() const { return feature_columns() + extra_inputs; }
   // Multiply-adds of one sample that do work: padding is not counted.
   double ForwardMacs() const;
 };
@@ -64,6 +69,13 @@ struct alignas(32) PoolSample {
   float value[3];                // f, 1/sr
   float cosine;                  // of the direction that is nearer to the normal
   float importance;              // factor of the loss
+};
+
+// Where a sample looks up the neural texture: rows of texels of two levels, bilinear in each. Rows
+// of weight 0 are rows of the texture, too.
+struct alignas(32) TexelTaps {
+  int32_t row[8];
+  float weight[8];
 };
 
 // What a lookup needs to know of the grid; bilinear weights.
@@ -93,7 +105,7 @@ struct ChunkScratch {
 struct ChunkResult {
   explicit ChunkResult(const NetworkLayout& layout);
   AlignedBuffer<float> weight_gradient;   // like the parameters
-  AlignedBuffer<float> feature_gradient;  // [kChunkRows][2 * feature_stride]
+  AlignedBuffer<float> feature_gradient;  // [kChunkRows][feature_columns]
   double loss = 0;                        // not finite if an output was not
   bool finite = true;                     // the squares of both gradients are
 };
@@ -106,6 +118,9 @@ struct ChunkTask {
   const int32_t* row_of_corner = nullptr;  // codebook: row of a corner; null: its own
   const PoolSample* samples = nullptr;
   int count = kChunkRows;  // 1..kChunkRows; the rest is computed for nothing
+  // Both null where the layout has no texture inputs.
+  const float* texture = nullptr;   // rows of texture_stride floats
+  const TexelTaps* taps = nullptr;  // of each sample
 };
 
 struct AdamSettings {
@@ -127,7 +142,7 @@ struct BrdfKernels {
                         PairLookups* pairs);
   // forward_chunk without the product of the first layer: it is linear, so its weights may act on
   // the corners' features beforehand. folded: rows of layers[0].outputs floats, W F of each corner,
-  // without the bias.
+  // without the bias. Layouts without texture inputs.
   void (*evaluate_chunk)(const NetworkLayout& layout, const float* parameters, const float* folded,
                          const PairLookups& pairs, ChunkScratch* scratch);
   // rgb [count][3] = max(0, exp(min(y, 12)) - 1) of the outputs of forward_chunk, 1..kChunkRows of
@@ -138,6 +153,9 @@ struct BrdfKernels {
   // order.
   void (*scatter)(const NetworkLayout& layout, const PoolSample* samples, int count, int hemisphere,
                   const ChunkResult& result, float* gradient);
+  // The same for the texels: gradient[row] += weight * texture gradient, rows of texture_stride.
+  void (*scatter_texels)(const NetworkLayout& layout, const TexelTaps* taps, int count,
+                         const ChunkResult& result, float* gradient);
   // gradient[j] = p_j (s_j - <p, s>) / temperature with p = softmax(logits / temperature) and s_j
   // = <code j, feature gradient>: design/neural-brdf. columns: a multiple of 16; a column of
   // padding has a logit below all others by 1e4 or more. transposed: codebook [stride][columns].

@@ -12,6 +12,24 @@ using brdf::kOutputs;
 using brdf::NetworkLayout;
 using brdf::PoolSample;
 
+PATINA_STAGE void GatherTexels(const ChunkTask& task, float* rows) {
+  const NetworkLayout& layout = *task.layout;
+  const int stride = layout.texture_stride;
+  for (int s = 0; s < kChunkRows; ++s) {
+    const brdf::TexelTaps& taps = task.taps[s < task.count ? s : 0];
+    float* row = rows + static_cast<ptrdiff_t>(s) * layout.layers[0].input_stride +
+                 2 * layout.feature_stride;
+    for (int k = 0; k < stride; k += 16) {
+      F16 sum = Zero();
+      Unroll<8>([&](auto c) PATINA_LAMBDA {
+        sum = MulAdd(Set(taps.weight[c]),
+                     Load(task.texture + static_cast<ptrdiff_t>(taps.row[c]) * stride + k), sum);
+      });
+      Store(row + k, sum);
+    }
+  }
+}
+
 PATINA_STAGE void GatherRows(const ChunkTask& task, float* rows) {
   const NetworkLayout& layout = *task.layout;
   const DenseLayer& first = layout.layers[0];
@@ -36,9 +54,10 @@ PATINA_STAGE void GatherRows(const ChunkTask& task, float* rows) {
         Store(row + side * stride + k, sum);
       }
     }
-    float* extra = row + 2 * stride;
+    float* extra = row + layout.feature_columns();
     for (int e = 0; e < layout.extra_inputs; ++e) extra[e] = sample.extra[e];
   }
+  if (layout.texture_stride > 0) GatherTexels(task, rows);
 }
 
 // The layers from `first` on, whose activations are set.
@@ -141,7 +160,7 @@ PATINA_STAGE void GatherFolded(const NetworkLayout& layout, const float* paramet
   const DenseLayer& first = layout.layers[0];
   const ptrdiff_t columns = first.outputs, stride = layout.layers[1].input_stride;
   const float* scalars =
-      parameters + first.weights + static_cast<ptrdiff_t>(2 * layout.feature_stride) * columns;
+      parameters + first.weights + static_cast<ptrdiff_t>(layout.feature_columns()) * columns;
   const float* bias = scalars + layout.extra_inputs * columns;
   for (int s = 0; s < kChunkRows; ++s) {
     for (ptrdiff_t n = 0; n < columns; n += 16) {
@@ -177,7 +196,7 @@ void TrainChunk(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* resul
                       kChunkRows, layer.outputs, result->weight_gradient.data() + layer.weights,
                       layer.outputs);
     // To the inputs: of the first layer only the features have a use for it.
-    const int columns = l == 0 ? 2 * layout.feature_stride : brdf::PadTo16(layer.inputs);
+    const int columns = l == 0 ? layout.feature_columns() : brdf::PadTo16(layer.inputs);
     float* lower = l == 0 ? result->feature_gradient.data() : scratch->gradient[l % 2].data();
     RowProduct<false>({upper, layer.outputs, 1}, kChunkRows, task.transposed + layer.transposed,
                       brdf::PadTo16(layer.inputs),
@@ -188,7 +207,7 @@ void TrainChunk(const ChunkTask& task, ChunkScratch* scratch, ChunkResult* resul
   }
   result->finite = SquaresAreFinite(result->weight_gradient.data(), layout.parameter_count) &&
                    SquaresAreFinite(result->feature_gradient.data(),
-                                    static_cast<size_t>(kChunkRows) * 2 * layout.feature_stride);
+                                    static_cast<size_t>(kChunkRows) * layout.feature_columns());
 }
 
 void Scatter(const NetworkLayout& layout, const PoolSample* samples, int count, int hemisphere,
@@ -196,10 +215,28 @@ void Scatter(const NetworkLayout& layout, const PoolSample* samples, int count, 
   const int stride = layout.feature_stride;
   for (int s = 0; s < count; ++s) {
     const float* from =
-        result.feature_gradient.data() + (static_cast<ptrdiff_t>(s) * 2 + hemisphere) * stride;
+        result.feature_gradient.data() +
+        static_cast<ptrdiff_t>(s) * layout.feature_columns() + hemisphere * stride;
     for (int c = 0; c < 4; ++c) {
       float* to = gradient + static_cast<ptrdiff_t>(samples[s].corner[4 * hemisphere + c]) * stride;
       const F16 weight = Set(samples[s].weight[4 * hemisphere + c]);
+      for (int k = 0; k < stride; k += 16)
+        Store(to + k, MulAdd(weight, Load(from + k), Load(to + k)));
+    }
+  }
+}
+
+void ScatterTexels(const NetworkLayout& layout, const brdf::TexelTaps* taps, int count,
+                   const ChunkResult& result, float* gradient) {
+  const int stride = layout.texture_stride;
+  for (int s = 0; s < count; ++s) {
+    const float* from = result.feature_gradient.data() +
+                        static_cast<ptrdiff_t>(s) * layout.feature_columns() +
+                        2 * layout.feature_stride;
+    for (int c = 0; c < 8; ++c) {
+      if (taps[s].weight[c] == 0) continue;
+      float* to = gradient + static_cast<ptrdiff_t>(taps[s].row[c]) * stride;
+      const F16 weight = Set(taps[s].weight[c]);
       for (int k = 0; k < stride; k += 16)
         Store(to + k, MulAdd(weight, Load(from + k), Load(to + k)));
     }
@@ -257,6 +294,7 @@ bool Adam(float* parameters, float* gradient, float* moment1, float* moment2, si
 
 extern const brdf::BrdfKernels kBrdfKernels;
 const brdf::BrdfKernels kBrdfKernels = {TrainChunk,   ForwardChunk, LookUpPairs,     EvaluateChunk,
-                                        OutputValues, Scatter,      SoftmaxGradient, Adam};
+                                        OutputValues, Scatter,      ScatterTexels,
+                                        SoftmaxGradient, Adam};
 
 }  // namespace patina::PATINA_SIMD

@@ -54,9 +54,11 @@ GridTrainer::GridTrainer(const NetworkLayout& layout, int corners, const BrdfKer
     const int used = last ? kOutputs : layout.hidden;
     for (int i = 0; i < layer.inputs; ++i) {
       // Rows of padding stay zero, or features that are never written would learn something.
-      const int side = i / layout.feature_stride;
-      const bool padding = l == 0 ? side < 2 && i % layout.feature_stride >= layout.primitive_size
-                                  : i >= layout.hidden;
+      const int side = i / layout.feature_stride, texture = i - 2 * layout.feature_stride;
+      const bool padding =
+          l > 0      ? i >= layout.hidden
+          : side < 2 ? i % layout.feature_stride >= layout.primitive_size
+                     : texture >= layout.texture_inputs && texture < layout.texture_stride;
       if (padding) continue;
       for (int n = 0; n < used; ++n)
         parameters_[layer.weights + static_cast<size_t>(i) * layer.outputs + n] =
@@ -66,7 +68,7 @@ GridTrainer::GridTrainer(const NetworkLayout& layout, int corners, const BrdfKer
   ParametersChanged();
 }
 
-ChunkTask GridTrainer::MakeTask(const PoolSample* samples, int count) const {
+ChunkTask GridTrainer::MakeTask(const PoolSample* samples, int count, const TexelTaps* taps) const {
   ChunkTask task;
   task.layout = &layout_;
   task.parameters = parameters_.data();
@@ -75,6 +77,10 @@ ChunkTask GridTrainer::MakeTask(const PoolSample* samples, int count) const {
   task.row_of_corner = has_codebook() ? index_.data() : nullptr;
   task.samples = samples;
   task.count = count;
+  if (texture_ != nullptr) {
+    task.texture = texture_->rows();
+    task.taps = taps;
+  }
   return task;
 }
 
@@ -90,15 +96,34 @@ bool GridTrainer::UpdateRows(const std::vector<int32_t>& rows, const AdamSetting
   return finite;
 }
 
-bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& rates) {
+void GridTrainer::RunChunks(const PoolSample* samples, int count, const TexelTaps* taps) {
   const int chunks = (count + kChunkRows - 1) / kChunkRows;
   while (static_cast<int>(results_.size()) < chunks)
     results_.push_back(std::make_unique<ChunkResult>(layout_));
   pool_.ParallelFor(chunks, [&](int chunk, int worker) {
     const int first = chunk * kChunkRows;
-    kernels_.train_chunk(MakeTask(samples + first, std::min(kChunkRows, count - first)),
+    kernels_.train_chunk(MakeTask(samples + first, std::min(kChunkRows, count - first),
+                                  taps == nullptr ? nullptr : taps + first),
                          scratch_[worker].get(), results_[chunk].get());
   });
+}
+
+void GridTrainer::VisitGradients(
+    const PoolSample* samples, size_t count, const TexelTaps* taps,
+    const std::function<void(size_t first, int rows, const ChunkResult& result)>& visit) {
+  constexpr size_t kBatch = size_t{16} * kChunkRows;
+  for (size_t begin = 0; begin < count; begin += kBatch) {
+    const int rows = static_cast<int>(std::min(kBatch, count - begin));
+    RunChunks(samples + begin, rows, taps == nullptr ? nullptr : taps + begin);
+    for (int first = 0; first < rows; first += kChunkRows)
+      visit(begin + first, std::min(kChunkRows, rows - first), *results_[first / kChunkRows]);
+  }
+}
+
+bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& rates,
+                       const TexelTaps* taps) {
+  const int chunks = (count + kChunkRows - 1) / kChunkRows;
+  RunChunks(samples, count, taps);
   double loss = 0;
   for (int chunk = 0; chunk < chunks; ++chunk) {
     if (!std::isfinite(results_[chunk]->loss) || !results_[chunk]->finite) return false;
@@ -109,7 +134,14 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
   if (has_codebook()) ++code_steps_;
 
   bool finite[3] = {true, true, true};
-  pool_.ParallelFor(3, [&](int job, int) {
+  pool_.ParallelFor(texture_ != nullptr ? 4 : 3, [&](int job, int) {
+    if (job == 3) {
+      for (int chunk = 0; chunk < chunks; ++chunk) {
+        const int first = chunk * kChunkRows;
+        texture_->Scatter(taps + first, std::min(kChunkRows, count - first), *results_[chunk]);
+      }
+      return;
+    }
     if (job == 2) {
       for (int chunk = 0; chunk < chunks; ++chunk) {
         const float* from = results_[chunk]->weight_gradient.data();
@@ -145,6 +177,7 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
                                moment2_.data());
   });
   bool all_finite = finite[0] && finite[1] && finite[2];
+  if (texture_ != nullptr) all_finite &= texture_->Update(pool_);
   if (!has_codebook()) return all_finite;
 
   // Corners of both directions share the codes.
@@ -179,7 +212,8 @@ bool GridTrainer::Step(const PoolSample* samples, int count, const StepRates& ra
 
 size_t GridTrainer::state_bytes() const {
   const size_t floats = parameters_.size() + (has_codebook() ? codebook_ : features_).size();
-  return floats * sizeof(float) + (soft_ ? soft_->state_bytes() : 0);
+  return floats * sizeof(float) + (soft_ ? soft_->state_bytes() : 0) +
+         (texture_ != nullptr ? texture_->state_bytes() : 0);
 }
 
 void GridTrainer::Save() {
@@ -190,22 +224,28 @@ void GridTrainer::Save() {
   copy(parameters_, &saved_parameters_);
   copy(has_codebook() ? codebook_ : features_, &saved_features_);
   if (soft_) soft_->Save();
+  if (texture_ != nullptr) texture_->Save(pool_);
 }
 
 void GridTrainer::Rollback() {
   AlignedBuffer<float>& features = has_codebook() ? codebook_ : features_;
   std::memcpy(parameters_.data(), saved_parameters_.data(), parameters_.size() * sizeof(float));
   std::memcpy(features.data(), saved_features_.data(), features.size() * sizeof(float));
+  ForgetMoments();
+  if (soft_) {
+    soft_->Rollback();
+    soft_->WriteIndices(index_);
+  }
+  if (texture_ != nullptr) texture_->Rollback(pool_);
+  ParametersChanged();
+}
+
+void GridTrainer::ForgetMoments() {
   for (auto* buffer : {&parameter_gradient_, &parameter_moment1_, &parameter_moment2_, &gradient_,
                        &moment1_, &moment2_, &code_gradient_, &code_moment1_, &code_moment2_}) {
     std::fill(buffer->data(), buffer->data() + buffer->size(), 0.0f);
   }
   steps_ = code_steps_ = logit_steps_ = 0;
-  if (soft_) {
-    soft_->Rollback();
-    soft_->WriteIndices(index_);
-  }
-  ParametersChanged();
 }
 
 void GridTrainer::UseSoftIndex(std::unique_ptr<SoftIndex> soft) {
@@ -223,12 +263,15 @@ void GridTrainer::UseCodebook(std::vector<float> codebook, std::vector<int32_t> 
   code_steps_ = 0;
 }
 
-void GridTrainer::Evaluate(const PoolSample* samples, size_t count, float* y) {
+void GridTrainer::Evaluate(const PoolSample* samples, size_t count, float* y,
+                           const TexelTaps* taps) {
   const int chunks = static_cast<int>((count + kChunkRows - 1) / kChunkRows);
   pool_.ParallelFor(chunks, [&](int chunk, int worker) {
     const size_t first = static_cast<size_t>(chunk) * kChunkRows;
     const int rows = static_cast<int>(std::min<size_t>(kChunkRows, count - first));
-    kernels_.forward_chunk(MakeTask(samples + first, rows), scratch_[worker].get());
+    kernels_.forward_chunk(
+        MakeTask(samples + first, rows, taps == nullptr ? nullptr : taps + first),
+        scratch_[worker].get());
     for (int s = 0; s < rows; ++s) {
       for (int c = 0; c < kOutputs; ++c)
         y[(first + s) * kOutputs + c] = scratch_[worker]->outputs[static_cast<size_t>(s) * 16 + c];

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/brdf/brdf_kernels.h"
 #include "pipeline/brdf/soft_index.h"
+#include "pipeline/brdf/texture_part.h"
 
 namespace patina::brdf {
 
@@ -35,13 +37,26 @@ class GridTrainer {
 
   // One step on `count` samples. Returns false if the loss, a gradient, a moment or a parameter is
   // not finite: the state is then of no use and has to be rolled back.
-  bool Step(const PoolSample* samples, int count, const StepRates& rates);
+  // taps: of each sample, with a texture; else null.
+  bool Step(const PoolSample* samples, int count, const StepRates& rates,
+            const TexelTaps* taps = nullptr);
+
+  // With a layout that has texture inputs, before anything else: the texture takes part in steps,
+  // saving and rolling back from now on. It must outlive the trainer.
+  void UseTexture(TexturePart* texture) { texture_ = texture; }
+
+  // The gradients of samples as a step would get them, chunk by chunk in order; nothing changes.
+  void VisitGradients(
+      const PoolSample* samples, size_t count, const TexelTaps* taps,
+      const std::function<void(size_t first, int rows, const ChunkResult& result)>& visit);
 
   // Save keeps what is trained for Rollback, which also forgets the optimiser's state. Whatever
   // else changes what is trained should save anew; UseCodebook and UseSoftIndex must be followed by
   // it.
   void Save();
   void Rollback();
+  // What Rollback does to the optimiser's state alone: after the parameters were changed otherwise.
+  void ForgetMoments();
   size_t state_bytes() const;  // of what Save copies
   double step_loss() const { return step_loss_; }  // mean of the last step's samples
 
@@ -55,7 +70,7 @@ class GridTrainer {
   bool has_codebook() const { return !index_.empty(); }
 
   // y of samples in order: [count][3].
-  void Evaluate(const PoolSample* samples, size_t count, float* y);
+  void Evaluate(const PoolSample* samples, size_t count, float* y, const TexelTaps* taps = nullptr);
 
   int corners() const { return corners_; }
   AlignedBuffer<float>& features() { return features_; }
@@ -65,7 +80,9 @@ class GridTrainer {
   void ParametersChanged() { TransposeWeights(layout_, parameters_.data(), transposed_.data()); }
 
  private:
-  ChunkTask MakeTask(const PoolSample* samples, int count) const;
+  ChunkTask MakeTask(const PoolSample* samples, int count, const TexelTaps* taps) const;
+  // The chunks of a batch, into results_.
+  void RunChunks(const PoolSample* samples, int count, const TexelTaps* taps);
   bool UpdateRows(const std::vector<int32_t>& rows, const AdamSettings& settings, float* values,
                   float* gradient, float* moment1, float* moment2);
 
@@ -80,6 +97,7 @@ class GridTrainer {
   AlignedBuffer<float> saved_parameters_, saved_features_;  // features or codebook
   std::vector<int32_t> index_;
   std::unique_ptr<SoftIndex> soft_;
+  TexturePart* texture_ = nullptr;
   std::vector<std::unique_ptr<ChunkScratch>> scratch_;
   std::vector<std::unique_ptr<ChunkResult>> results_;
   std::vector<uint8_t> touched_, code_touched_;

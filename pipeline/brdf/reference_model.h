@@ -15,10 +15,11 @@ inline double RealOf(double x) { return x; }
 inline double RealOf(const std::complex<double>& x) { return x.real(); }
 
 // y [kOutputs] of one sample: features are rows of layout.feature_stride, parameters as layout
-// says.
+// says; texture and taps as in ChunkTask.
 template <class S>
 void ForwardReference(const NetworkLayout& layout, const S* parameters, const S* features,
-                      const PoolSample& sample, S* y) {
+                      const PoolSample& sample, S* y, const S* texture = nullptr,
+                      const TexelTaps* taps = nullptr) {
   std::vector<S> a(layout.input_columns());
   for (int side = 0; side < 2; ++side) {
     for (int k = 0; k < layout.feature_stride; ++k) {
@@ -30,8 +31,16 @@ void ForwardReference(const NetworkLayout& layout, const S* parameters, const S*
       a[side * layout.feature_stride + k] = sum;
     }
   }
+  for (int k = 0; k < layout.texture_stride; ++k) {
+    S sum = S(0);
+    for (int c = 0; c < 8; ++c) {
+      sum += S(taps->weight[c]) *
+             texture[static_cast<size_t>(taps->row[c]) * layout.texture_stride + k];
+    }
+    a[2 * layout.feature_stride + k] = sum;
+  }
   for (int e = 0; e < layout.extra_inputs; ++e)
-    a[2 * layout.feature_stride + e] = S(sample.extra[e]);
+    a[layout.feature_columns() + e] = S(sample.extra[e]);
   for (size_t l = 0; l < layout.layers.size(); ++l) {
     const DenseLayer& layer = layout.layers[l];
     std::vector<S> c(layer.outputs);

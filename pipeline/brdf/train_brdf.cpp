@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numbers>
 
-#include "formats/half.h"
 #include "pipeline/base/cpu_time.h"
 #include "pipeline/brdf/grid_trainer.h"
+#include "pipeline/brdf/model_export.h"
 #include "pipeline/brdf/quantiser.h"
+#include "pipeline/brdf/schedule.h"
 
 namespace patina::brdf {
 namespace {
@@ -16,39 +16,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr size_t kHeldOut = 16384;
-constexpr int kWarmUpSteps = 100;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-// A sixteenth of the indices stays free: rare codes bring least, and the default model stays below
-// 25 KB.
-int CodesOf(const ModelShape& shape) {
-  const int indices = 1 << shape.index_bits;
-  return indices - indices / 16;
-}
-
-float CosineRate(int step, int steps) {
-  const double warm = std::min(1.0, (step + 1.0) / kWarmUpSteps);
-  return static_cast<float>(warm * 0.5 * (1 + std::cos(std::numbers::pi * step / steps)));
-}
-
-// Mean |log1p(f c) - log1p(f* c)| of samples; negative values as zero.
-double HeldOutLoss(GridTrainer* trainer, const PoolSample* samples, size_t count) {
-  std::vector<float> y(count * kOutputs);
-  trainer->Evaluate(samples, count, y.data());
-  double sum = 0;
-  for (size_t s = 0; s < count; ++s) {
-    for (int c = 0; c < kOutputs; ++c) {
-      const double f = std::max(
-          0.0, std::expm1(static_cast<double>(std::min(y[s * kOutputs + c], kMaxLogValue))));
-      const double wanted = std::max(0.0, static_cast<double>(samples[s].value[c]));
-      const double cosine = static_cast<double>(samples[s].cosine);
-      sum += std::abs(std::log1p(f * cosine) - std::log1p(wanted * cosine));
-    }
-  }
-  return sum / static_cast<double>(count * kOutputs);
 }
 
 class Session {
@@ -158,7 +128,11 @@ class Session {
 
   bool Cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
   int Codes() const { return CodesOf(shape_); }
-  double HeldOut() { return HeldOutLoss(&trainer_, samples_.data() + train_count_, held_out_); }
+  double HeldOut() {
+    std::vector<float> y(held_out_ * kOutputs);
+    trainer_.Evaluate(samples_.data() + train_count_, held_out_, y.data());
+    return MeanLogError(y, samples_.data() + train_count_);
+  }
 
   void CountUsage() {
     usage_.assign(static_cast<size_t>(trainer_.corners()), 0.0f);
@@ -297,102 +271,11 @@ class Session {
 
   Result<std::vector<TrainedBrdf>> Finish() {
     result_.shape = shape_;
-    PATINA_TRY(MakeNetwork());
+    PATINA_ASSIGN(result_.network, ExportNetwork(layout_, trainer_.parameters().data()));
     std::vector<TrainedBrdf> all(static_cast<size_t>(materials_), result_);
-    for (int m = 0; m < materials_; ++m) all[m].pack = PackOf(m);
-    const std::vector<int> codes = DropUnusedCodes(&all);
-    for (TrainedBrdf& material : all) {
-      for (const int code : codes) {
-        for (int k = 0; k < shape_.primitive_size; ++k) {
-          material.pack.codebook.push_back(FloatToHalf(
-              trainer_.codebook()[static_cast<size_t>(code) * layout_.feature_stride + k]));
-        }
-      }
-    }
+    std::vector<IndexPack> packs = ExportPacks(shape_, materials_, usage_, &trainer_);
+    for (size_t m = 0; m < all.size(); ++m) all[m].pack = std::move(packs[m]);
     return all;
-  }
-
-  // Without the codebook.
-  IndexPack PackOf(int material) const {
-    IndexPack pack;
-    pack.nside = shape_.grid.nside;
-    pack.primitive_size = shape_.primitive_size;
-    pack.index_bits = shape_.index_bits;
-    pack.interpolation = shape_.grid.interpolation;
-    pack.isotropic = shape_.grid.isotropic;
-    pack.canonical_order = shape_.grid.canonical_order;
-    pack.angle_inputs = shape_.grid.angle_inputs;
-    pack.half_vector_inputs = shape_.grid.half_vector_inputs;
-    const int corners = shape_.grid.corners();
-    for (int side = 0; side < 2; ++side) {
-      pack.stored[side].resize(corners);
-      for (int c = 0; c < corners; ++c) {
-        const int corner = (2 * material + side) * corners + c;
-        pack.stored[side][c] = usage_[corner] > 0 ? 1 : 0;
-        if (usage_[corner] > 0)
-          pack.indices.push_back(static_cast<uint16_t>(trainer_.index()[corner]));
-      }
-    }
-    return pack;
-  }
-
-  // Renumbers the indices; returns the codes that a material uses.
-  std::vector<int> DropUnusedCodes(std::vector<TrainedBrdf>* all) const {
-    std::vector<int> place(static_cast<size_t>(Codes()), -1), codes;
-    for (const TrainedBrdf& material : *all) {
-      for (const uint16_t index : material.pack.indices) place[index] = 0;
-    }
-    for (int code = 0; code < Codes(); ++code) {
-      if (place[code] < 0) continue;
-      place[code] = static_cast<int>(codes.size());
-      codes.push_back(code);
-    }
-    for (TrainedBrdf& material : *all) {
-      for (uint16_t& index : material.pack.indices) index = static_cast<uint16_t>(place[index]);
-    }
-    return codes;
-  }
-
-  // Padding of features and hidden units goes; the weights become halves.
-  Status MakeNetwork() {
-    for (size_t l = 0; l < layout_.layers.size(); ++l) {
-      const DenseLayer& layer = layout_.layers[l];
-      const bool last = l + 1 == layout_.layers.size();
-      const int outputs = last ? kOutputs : shape_.hidden;
-      std::vector<int> columns;
-      if (l == 0) {
-        for (int side = 0; side < 2; ++side) {
-          for (int k = 0; k < shape_.primitive_size; ++k)
-            columns.push_back(side * layout_.feature_stride + k);
-        }
-        for (int e = 0; e < layout_.extra_inputs; ++e)
-          columns.push_back(2 * layout_.feature_stride + e);
-      } else {
-        for (int i = 0; i < shape_.hidden; ++i) columns.push_back(i);
-      }
-      WeightTensor weight, bias;
-      weight.name = "layer" + std::to_string(l) + ".weight";
-      weight.shape = {static_cast<uint32_t>(outputs), static_cast<uint32_t>(columns.size())};
-      bias.name = "layer" + std::to_string(l) + ".bias";
-      bias.shape = {static_cast<uint32_t>(outputs)};
-      const float* w = trainer_.parameters().data() + layer.weights;
-      for (int o = 0; o < outputs; ++o) {
-        for (const int i : columns)
-          weight.elements.push_back(FloatToHalf(w[static_cast<size_t>(i) * layer.outputs + o]));
-        bias.elements.push_back(
-            FloatToHalf(w[static_cast<size_t>(layer.inputs) * layer.outputs + o]));
-      }
-      for (const auto* elements : {&weight.elements, &bias.elements}) {
-        for (const uint16_t half : *elements) {
-          if ((half & 0x7C00) == 0x7C00)
-            return Fail(ErrorCode::kOutOfRange,
-                        "a weight of the network does not fit half precision");
-        }
-      }
-      result_.network.tensors.push_back(std::move(weight));
-      result_.network.tensors.push_back(std::move(bias));
-    }
-    return {};
   }
 
   const ModelShape& shape_;
@@ -468,6 +351,19 @@ TrainOptions DefaultTraining(const SourceKind& kind) {
   return options;
 }
 
+Status CheckShape(const ModelShape& shape) {
+  if (shape.grid.nside < 1 || shape.grid.nside > 256 || shape.primitive_size < 1 ||
+      shape.primitive_size > 64 || shape.index_bits < 1 || shape.index_bits > 12 ||
+      shape.hidden < 4 || shape.hidden > 256 || shape.hidden_layers < 1 ||
+      shape.hidden_layers > 4) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "the model's shape is out of range: Nside 1 to 256, primitives of 1 to 64 numbers, "
+                "1 to 12 index bits, 1 to 4 "
+                "hidden layers of 4 to 256 units");
+  }
+  return {};
+}
+
 Result<TrainedBrdf> TrainBrdf(const Source& source, const ModelShape& shape,
                               const TrainOptions& options, ThreadPool& pool,
                               ProgressSink& progress) {
@@ -481,15 +377,7 @@ Result<std::vector<TrainedBrdf>> TrainShared(std::span<const Source* const> sour
                                              const ModelShape& shape, const TrainOptions& options,
                                              ThreadPool& pool, ProgressSink& progress) {
   PATINA_ASSIGN(const SimdTarget target, ActiveSimdTarget());
-  if (shape.grid.nside < 1 || shape.grid.nside > 256 || shape.primitive_size < 1 ||
-      shape.primitive_size > 64 || shape.index_bits < 1 || shape.index_bits > 12 ||
-      shape.hidden < 4 || shape.hidden > 256 || shape.hidden_layers < 1 ||
-      shape.hidden_layers > 4) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "the model's shape is out of range: Nside 1 to 256, primitives of 1 to 64 numbers, "
-                "1 to 12 index bits, 1 to 4 "
-                "hidden layers of 4 to 256 units");
-  }
+  PATINA_TRY(CheckShape(shape));
   return Session(sources, shape, options, pool, progress, KernelsFor(target)).Run();
 }
 

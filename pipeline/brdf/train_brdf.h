@@ -30,6 +30,9 @@ struct ModelShape {
   int hidden_layers = 3;
 };
 
+// Errors: kInvalidArgument (out of range).
+Status CheckShape(const ModelShape& shape);
+
 // What of a source decides the shape of its model.
 struct SourceKind {
   bool isotropic = true;

@@ -65,7 +65,7 @@ void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.seed, &job->seed);
   Override(overrides.threads, &job->threads);
   if (overrides.no_report) job->report = false;
-  if (job->kind == JobKind::kBrdf) {
+  if (job->kind != JobKind::kMaterial) {
     const std::string names = MapOptions(overrides);
     if (!names.empty()) {
       std::fprintf(stderr, "patina: warning: %s: a BRDF has no %s; passed over\n",
@@ -172,7 +172,7 @@ std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
     for (PlannedJob& planned : plan) {
       if (!maps) planned.job = Fail(maps.error());
       if (!planned.job) continue;
-      const bool brdf = planned.job->kind == JobKind::kBrdf;
+      const bool brdf = planned.job->kind != JobKind::kMaterial;
       if (brdf || !planned.job->scene.empty()) {
         planned.job = Fail(ErrorCode::kInvalidArgument,
                            std::string("--maps describes a texture set, and this is a ") +

@@ -8,6 +8,7 @@
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
 #include "pipeline/jobs/sample_brdf.h"
+#include "pipeline/jobs/sample_btf.h"
 #include "pipeline/jobs/sample_layered.h"
 #include "pipeline/jobs/sample_scene.h"
 #include "pipeline/jobs/sample_set.h"
@@ -73,17 +74,32 @@ int CompareCommand(const CommandLine& line, const CancelToken& cancel) {
 int SampleCommand(const CommandLine& line) {
   const SampleOptions& options = line.sample;
   std::vector<std::string> paths;
+  constexpr int kDefaultSize = 1024, kDefaultBtfSize = 64;
+  const int size = options.size.value_or(options.kind == "btf" ? kDefaultBtfSize : kDefaultSize);
+  if (options.kind == "btf") {
+    if (size > kMaxSampleBtfSide) {
+      return FailCommand({ErrorCode::kInvalidArgument,
+                          "--size: " + std::to_string(size) + " texels are too many for a BTF; " +
+                              "give at most " + std::to_string(kMaxSampleBtfSide)});
+    }
+    ThreadPool pool(line.threads);
+    SetImageIoThreads(1);
+    auto written = WriteSampleBtf(options.out, {size, options.images, options.seed}, pool);
+    if (!written) return FailCommand(written.error());
+    // Thousands of images need no line each.
+    paths = {written->front()};
+  }
   if (options.kind == "scene") {
     ThreadPool pool(line.threads);
     SetImageIoThreads(pool.threads());
-    auto written = WriteSampleScene(options.out, options.size, options.seed, pool);
+    auto written = WriteSampleScene(options.out, size, options.seed, pool);
     if (!written) return FailCommand(written.error());
     paths = std::move(*written);
   }
   if (options.kind == "material" || options.kind == "all") {
     ThreadPool pool(line.threads);
     SetImageIoThreads(pool.threads());
-    auto written = WriteSampleSet(options.out, options.size, options.seed, pool);
+    auto written = WriteSampleSet(options.out, size, options.seed, pool);
     if (!written) return FailCommand(written.error());
     paths = std::move(*written);
   }

@@ -10,6 +10,7 @@
 #include "pipeline/jobs/brdf_job.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/sample_btf.h"
 #include "pipeline/jobs/sample_set.h"
 
 namespace patina {
@@ -42,7 +43,9 @@ constexpr const char* kBakeFooter =
     "INPUT is a folder of maps (found by their file names), a measured BRDF (MERL .binary, RGL "
     ".bsdf, UTIA .bin, a\n"
     "list of measurements as .csv or .json), a layered material to simulate (*.layers.json, see\n"
-    "schemas/layered.schema.json), a folder of all these or of such folders, or a job file (see\n"
+    "schemas/layered.schema.json), a set of measured images under many lights and views\n"
+    "(*.btf.json, see schemas/image-set.schema.json), a folder of all these or of such folders, or "
+    "a job file (see\n"
     "schemas/job.schema.json), whose fields the options replace. One asset that fails does not "
     "stop the others; the exit\n"
     "code is that of the worst. The result is OUT/<asset>/<revision>/ with OUT/<asset>/current "
@@ -54,8 +57,10 @@ constexpr const char* kBakeFooter =
     "  patina bake library --out baked --quality preview --json\n"
     "  patina bake merl/*.binary brushed.bsdf --out baked\n"
     "  patina bake layered/car_paint.layers.json --out baked --quality reference\n"
+    "  patina bake cloth/cloth.btf.json --out baked    a spatially varying BRDF\n"
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
-    "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches it\n"
+    "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches "
+    "it\n"
     "  patina bake wall --out baked --size-budget 400k --time-budget 60\n"
     "\n"
     "The colour space of a colour map is what the map list says; else --color-space; else a word "
@@ -384,10 +389,19 @@ void AddSample(CLI::App* app, CommandLine* line) {
       ->add_option(
           "--kind", o.kind,
           "material: maps and a job.json; brdf: BRDF files of every format, 200 MB; layered: "
-          "materials of layers to simulate; scene: a glTF scene and a scene file; all "
+          "materials of layers to simulate; scene: a glTF scene and a scene file; btf: a bumpy "
+          "surface of two materials as a set of images; all "
           "(default): the material, and two small BRDF files in DIR/brdf")
-      ->check(CLI::IsMember({"all", "material", "brdf", "layered", "scene"}));
-  command->add_option("--size", o.size, "Texels a side of the maps (default 1024)")
+      ->check(CLI::IsMember({"all", "material", "brdf", "layered", "scene", "btf"}));
+  command
+      ->add_option("--images", o.images,
+                   "Images of a BTF, as many lights as views (default 256, at most 22801)")
+      ->check(CLI::Range(1, kMaxSampleBtfImages))
+      ->type_name("N");
+  command
+      ->add_option("--size", o.size,
+                   "Texels a side of the maps (default 1024), of a BTF's images (default 64, at "
+                   "most 1024)")
       ->check(CLI::Range(1, kMaxSampleSide))
       ->type_name("N");
   command
@@ -407,6 +421,8 @@ void AddSample(CLI::App* app, CommandLine* line) {
       "  patina bake brdfs --out baked\n"
       "  patina sample --kind layered --out layered\n"
       "  patina bake layered/car_paint.layers.json --out baked\n"
+      "  patina sample --kind btf --out bumps --size 128 --images 2500\n"
+      "  patina bake bumps --out baked\n"
       "  patina sample --kind scene --out scene\n"
       "  patina bake scene/mosaic.gltf --out baked");
   command->callback([line] { line->command = Command::kSample; });

@@ -94,8 +94,9 @@ struct EvalOptions {
 
 struct SampleOptions {
   std::string out;
-  std::string kind = "all";  // "all", "material", "brdf", "layered", "scene"
-  int size = 1024;
+  std::string kind = "all";  // "all", "material", "brdf", "layered", "scene", "btf"
+  std::optional<int> size;   // 1024; of a BTF 64
+  int images = 256;
   uint64_t seed = 1;
 };
 

@@ -105,6 +105,11 @@ int TradeoffCommand(const CommandLine& line, const CancelToken& cancel) {
         worst = kExitBadInput;
         continue;
       }
+      if (planned.job->kind == JobKind::kSvbrdf) {
+        PrintError(planned.asset + ": is a set of images, of which no variants are baked; give " +
+                   "texture sets or BRDF files");
+        continue;
+      }
       planned.job->threads = line.threads;
       (planned.job->kind == JobKind::kBrdf ? brdfs : materials).push_back(std::move(*planned.job));
     }

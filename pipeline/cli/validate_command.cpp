@@ -5,6 +5,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/job_result.h"
+#include "pipeline/svbrdf/image_set.h"
 #include "pipeline/validate/report.h"
 #include "pipeline/validate/settings.h"
 
@@ -31,9 +32,8 @@ Result<Job> SourceJob(const std::string& source) {
     job.folder = source;
   } else if (!fs::exists(source, ignored)) {
     return Fail(ErrorCode::kNotFound, source + ": there is no such source");
-  } else if (LooksLikeBrdfFile(source)) {
-    job.kind = JobKind::kBrdf;
-    job.file = source;
+  } else if (svbrdf::IsImageSetFileName(source) || LooksLikeBrdfFile(source)) {
+    job = JobOfBrdfFile("", source);
   } else {
     return ReadJobFile(source);
   }

@@ -12,6 +12,7 @@
 #include "formats/brdf/utia.h"
 #include "formats/layered/layered_file.h"
 #include "pipeline/jobs/job.h"
+#include "pipeline/svbrdf/image_set.h"
 
 namespace patina {
 namespace {
@@ -97,8 +98,33 @@ bool LooksLikeBrdfFile(const std::string& path) {
 
 std::string BrdfAssetName(const std::string& path) {
   const fs::path stem = fs::path(path).stem();
-  // Without both parts of ".layers.json".
-  return AssetNameFromPath((layered::IsLayersFileName(path) ? stem.stem() : stem).string());
+  // Without both parts of ".layers.json" and ".btf.json".
+  const bool two = layered::IsLayersFileName(path) || svbrdf::IsImageSetFileName(path);
+  return AssetNameFromPath((two ? stem.stem() : stem).string());
+}
+
+std::vector<std::string> FindImageSets(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code ignored;
+    const std::string path = entry->path().string();
+    if (entry->path().filename().string()[0] != '.' && svbrdf::IsImageSetFileName(path) &&
+        entry->is_regular_file(ignored)) {
+      files.push_back(path);
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+Job JobOfBrdfFile(const std::string& asset, const std::string& file) {
+  Job job;
+  job.kind = svbrdf::IsImageSetFileName(file) ? JobKind::kSvbrdf : JobKind::kBrdf;
+  job.asset = asset;
+  job.file = file;
+  return job;
 }
 
 Result<std::vector<std::string>> FindBrdfFiles(const std::string& folder) {

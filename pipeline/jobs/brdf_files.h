@@ -1,10 +1,11 @@
-// Which files hold BRDFs: measured ones, and layered materials to simulate.
+// Which files hold BRDFs: measured ones, layered materials to simulate, and lists of images.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "formats/base/result.h"
+#include "pipeline/jobs/job.h"
 
 namespace patina {
 
@@ -20,7 +21,15 @@ bool LooksLikeBrdfFile(const std::string& path);
 // The name of a BRDF's asset: the file's name without extension.
 std::string BrdfAssetName(const std::string& path);
 
-// The BRDF files directly in a folder, sorted; hidden ones are passed over. Errors: kIo.
+// The lists of images (svbrdf::kImageSetSuffix) directly in a folder, sorted; none of one that
+// cannot be listed.
+std::vector<std::string> FindImageSets(const std::string& folder);
+
+// The job that bakes a BRDF file or a list of images; without `out`.
+Job JobOfBrdfFile(const std::string& asset, const std::string& file);
+
+// The BRDF files directly in a folder, lists of images left out, sorted; hidden ones are passed
+// over. Errors: kIo.
 Result<std::vector<std::string>> FindBrdfFiles(const std::string& folder);
 
 }  // namespace patina

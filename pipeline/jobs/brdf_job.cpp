@@ -25,22 +25,25 @@ const char* InterpolationName(Interpolation interpolation) {
   return "bilinear";
 }
 
+void OverrideModel(const JobModel& model, brdf::ModelShape* shape) {
+  Override(model.nside, &shape->grid.nside);
+  Override(model.primitive_size, &shape->primitive_size);
+  Override(model.index_bits, &shape->index_bits);
+  Override(model.hidden, &shape->hidden);
+  Override(model.hidden_layers, &shape->hidden_layers);
+  Override(model.angle_inputs, &shape->grid.angle_inputs);
+  Override(model.canonical_order, &shape->grid.canonical_order);
+  if (!shape->grid.angle_inputs) shape->grid.half_vector_inputs = false;
+  for (const Interpolation interpolation : kInterpolations) {
+    if (model.interpolation == InterpolationName(interpolation))
+      shape->grid.interpolation = interpolation;
+  }
+}
+
 brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind) {
   brdf::ModelShape shape =
       job.recipe == Recipe::kPaper ? brdf::PaperShape(kind) : brdf::DefaultShape(kind);
-  const JobModel& model = job.model;
-  Override(model.nside, &shape.grid.nside);
-  Override(model.primitive_size, &shape.primitive_size);
-  Override(model.index_bits, &shape.index_bits);
-  Override(model.hidden, &shape.hidden);
-  Override(model.hidden_layers, &shape.hidden_layers);
-  Override(model.angle_inputs, &shape.grid.angle_inputs);
-  Override(model.canonical_order, &shape.grid.canonical_order);
-  if (!shape.grid.angle_inputs) shape.grid.half_vector_inputs = false;
-  for (const Interpolation interpolation : kInterpolations) {
-    if (model.interpolation == InterpolationName(interpolation))
-      shape.grid.interpolation = interpolation;
-  }
+  OverrideModel(job.model, &shape);
   return shape;
 }
 

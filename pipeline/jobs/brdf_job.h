@@ -22,6 +22,9 @@ inline constexpr int kMaxJobHiddenLayers = 4;
 
 const char* InterpolationName(Interpolation interpolation);  // as in job files and manifests
 
+// Puts what a job says of the grid and the network in the place of what the shape has.
+void OverrideModel(const JobModel& model, brdf::ModelShape* shape);
+
 // The model's shape: the recipe's, with what the job says in its place.
 brdf::ModelShape ModelOfJob(const Job& job, const brdf::SourceKind& kind);
 

@@ -67,7 +67,9 @@ Json QualityJson(const BrdfMeasurement& measurement, bool is_list) {
   return json;
 }
 
-Json ModelJson(const ManifestBrdf& model) {
+}  // namespace
+
+nlohmann::ordered_json BrdfModelJson(const ManifestBrdf& model) {
   return {{"nside", model.nside},
           {"primitive_size", model.primitive_size},
           {"index_bits", model.index_bits},
@@ -78,8 +80,6 @@ Json ModelJson(const ManifestBrdf& model) {
           {"half_vector_inputs", model.half_vector_inputs},
           {"layers", model.layers}};
 }
-
-}  // namespace
 
 Result<BrdfSource> ReadBrdfSource(const Job& job) {
   // Hashed before and after reading: a file that is still being copied must not get a container
@@ -164,6 +164,20 @@ Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model) {
   return {};
 }
 
+void DescribeBrdfModel(const brdf::ModelShape& shape, int texture_inputs, ManifestBrdf* model) {
+  model->nside = shape.grid.nside;
+  model->primitive_size = shape.primitive_size;
+  model->index_bits = shape.index_bits;
+  model->interpolation = InterpolationName(shape.grid.interpolation);
+  model->isotropic = shape.grid.isotropic;
+  model->canonical_order = shape.grid.canonical_order;
+  model->angle_inputs = shape.grid.angle_inputs;
+  model->half_vector_inputs = shape.grid.half_vector_inputs;
+  model->layers.push_back(2 * shape.primitive_size + shape.grid.extra_inputs() + texture_inputs);
+  model->layers.insert(model->layers.end(), static_cast<size_t>(shape.hidden_layers), shape.hidden);
+  model->layers.push_back(brdf::kOutputs);
+}
+
 Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape,
                       const SharedCodebook& shared) {
   Manifest manifest;
@@ -189,18 +203,8 @@ Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::Mode
   model.grid = kGridName;
   model.shared_codebook_file = shared.file;
   model.shared_codebook_sha256 = shared.sha256;
-  model.nside = shape.grid.nside;
-  model.primitive_size = shape.primitive_size;
-  model.index_bits = shape.index_bits;
-  model.interpolation = InterpolationName(shape.grid.interpolation);
-  model.isotropic = shape.grid.isotropic;
-  model.canonical_order = shape.grid.canonical_order;
-  model.angle_inputs = shape.grid.angle_inputs;
-  model.half_vector_inputs = shape.grid.half_vector_inputs;
   model.network = kWeightsName;
-  model.layers.push_back(2 * shape.primitive_size + shape.grid.extra_inputs());
-  model.layers.insert(model.layers.end(), static_cast<size_t>(shape.hidden_layers), shape.hidden);
-  model.layers.push_back(brdf::kOutputs);
+  DescribeBrdfModel(shape, 0, &model);
   manifest.brdf = std::move(model);
   manifest.effects = DescribeBrdfEffects(job, source, shape);
   return manifest;
@@ -247,7 +251,7 @@ std::string BrdfReportToJson(const Manifest& manifest, const std::vector<Manifes
   }
   if (source.anisotropy) json["source"]["anisotropy"] = *source.anisotropy;
   json["effects"] = EffectsToJson(manifest.effects);
-  json["model"] = ModelJson(described);
+  json["model"] = BrdfModelJson(described);
   json["quality"] = QualityJson(measurement, source.data.table == nullptr);
   json["training"] = {
       {"samples", model.samples},

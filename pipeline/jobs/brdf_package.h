@@ -1,6 +1,7 @@
 // From a trained BRDF to the payloads and the manifest of a container.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,6 +53,12 @@ Status AddBrdfModel(const brdf::TrainedBrdf& model, const SharedCodebook& shared
 // must stand beside the payloads already. Errors: those of the decoder, EncodeBrdfSampler and
 // AddPayload.
 Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model);
+
+// Shape of grid and network; texture_inputs: of a neural texture behind them.
+void DescribeBrdfModel(const brdf::ModelShape& shape, int texture_inputs, ManifestBrdf* model);
+
+// The same as in report.json.
+nlohmann::ordered_json BrdfModelJson(const ManifestBrdf& model);
 
 // The manifest of a container, without its quality.
 Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape,

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/model_bytes.h"
+#include "pipeline/jobs/measure_svbrdf.h"
 #include "pipeline/jobs/package.h"
 
 namespace patina {
@@ -98,14 +99,14 @@ std::string Joined(const std::vector<std::string>& names) {
 std::string BrdfText(const Manifest& m) {
   const ManifestBrdf& brdf = *m.brdf;
   std::string text =
-      Format("  BRDF from a file of format %s, %s, quality %s, recipe %s %d, seed %llu\n",
-             brdf.source_format.c_str(), brdf.isotropic ? "isotropic" : "anisotropic",
-             m.quality_setting.c_str(), m.tool.recipe.c_str(), m.tool.recipe_version,
-             static_cast<unsigned long long>(m.seed));
+      Format("  %s from a file of format %s, %s, quality %s, recipe %s %d, seed %llu\n",
+             brdf.images ? "spatially varying BRDF" : "BRDF", brdf.source_format.c_str(),
+             brdf.isotropic ? "isotropic" : "anisotropic", m.quality_setting.c_str(),
+             m.tool.recipe.c_str(), m.tool.recipe_version, static_cast<unsigned long long>(m.seed));
   text += "\nQuality\n";
-  text += Measure("lit sphere, MAE", brdf.quality.image_mae);
-  text += Measure("lit sphere, RMSE", brdf.quality.image_rmse);
-  text += Measure("lit sphere, SSIM", brdf.quality.image_ssim);
+  text += Measure(brdf.images ? "lit planes, MAE" : "lit sphere, MAE", brdf.quality.image_mae);
+  text += Measure(brdf.images ? "lit planes, RMSE" : "lit sphere, RMSE", brdf.quality.image_rmse);
+  text += Measure(brdf.images ? "lit planes, SSIM" : "lit sphere, SSIM", brdf.quality.image_ssim);
   text += Measure("MSE of log(1 + f)", brdf.quality.log1p_mse);
   text += Measure("reciprocity error", brdf.quality.reciprocity_error);
   for (const ManifestAlbedo& albedo : brdf.quality.albedo) {
@@ -131,9 +132,20 @@ std::string BrdfText(const Manifest& m) {
   text += ", " + brdf.activation + "\n";
   text += Format("  %llu bytes for an engine to load\n",
                  static_cast<unsigned long long>(ModelBytes(m.payloads)));
+  if (!m.features.empty()) {
+    text += Format("  neural texture: %zu x %d x %d texels, %d mips, %s\n", m.features.size(),
+                   m.features[0].width, m.features[0].height, m.features[0].levels,
+                   brdf.images->address.c_str());
+  }
   text += "\nSource\n";
   for (const ManifestBrdfFile& file : brdf.files) text += "  " + file.path + "\n";
-  if (brdf.simulation) {
+  if (brdf.images) {
+    text += Format(
+        "  %llu images of %d x %d; the container is %.0f times smaller than they are as "
+        "halves\n",
+        static_cast<unsigned long long>(brdf.images->images), brdf.images->width,
+        brdf.images->height, CompressionRatio(brdf, ModelBytes(m.payloads)));
+  } else if (brdf.simulation) {
     text += Format("  simulated: %llu pairs of directions, %llu paths, standard error %.4f\n",
                    static_cast<unsigned long long>(brdf.simulation->pairs),
                    static_cast<unsigned long long>(brdf.simulation->paths),

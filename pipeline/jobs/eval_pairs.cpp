@@ -97,6 +97,12 @@ Result<std::vector<DirectionPair>> ParsePairs(std::string_view text, const std::
 
 Result<std::string> EvaluatePairsFile(const std::string& container, const std::string& pairs_file) {
   PATINA_ASSIGN(const Container opened, OpenContainer(container));
+  if (opened.manifest.kind == "svbrdf") {
+    return Fail(ErrorCode::kUnsupported,
+                opened.directory +
+                    ": holds a spatially varying BRDF, which has values at places as well as at "
+                    "pairs of directions; report.html shows some");
+  }
   if (opened.manifest.kind != "brdf") {
     return Fail(ErrorCode::kUnsupported,
                 opened.directory +

@@ -9,6 +9,7 @@
 #include "formats/base/file_io.h"
 #include "formats/base/strict_json.h"
 #include "pipeline/jobs/brdf_job.h"
+#include "pipeline/jobs/svbrdf_job.h"
 
 namespace patina {
 namespace {
@@ -216,6 +217,7 @@ JobModel ReadModel(const Json& object, std::vector<std::string>* problems) {
   ReadInt(&reader, "index_bits", 1, kMaxJobIndexBits, &model.index_bits);
   ReadInt(&reader, "hidden", kMinJobHidden, kMaxJobHidden, &model.hidden);
   ReadInt(&reader, "hidden_layers", 1, kMaxJobHiddenLayers, &model.hidden_layers);
+  ReadInt(&reader, "textures", 1, kFeatureTextures, &model.textures);
   std::string interpolation;
   reader.Choice("interpolation", {"bilinear", "inverse_distance", "uniform"}, &interpolation);
   if (!interpolation.empty()) model.interpolation = interpolation;
@@ -348,8 +350,14 @@ void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Jo
         "profile", "address", "normal_convention", "target_psnr_db", "target_bpp",
         "size_budget_bytes", "time_budget_s", "samples",
         "min_psnr_db", "repair_nonfinite", "toksvig", "working_space", "color_space", "ocio"}) {
-    reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"brdf\"");
+    reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"" +
+                            std::string(JobKindName(job->kind)) + "\"");
   }
+  const bool varies = job->kind == JobKind::kSvbrdf;
+  if (!varies && job->model.textures)
+    reader->Complain("model", "\"textures\" belongs to jobs of kind \"svbrdf\"; leave it out");
+  if (varies && job->model.index_training)
+    reader->Complain("model", "\"index_training\" belongs to jobs of kind \"brdf\"; leave it out");
 }
 
 template <class T>
@@ -367,6 +375,7 @@ std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
   SetIf("index_bits", model.index_bits, &json);
   SetIf("hidden", model.hidden, &json);
   SetIf("hidden_layers", model.hidden_layers, &json);
+  SetIf("textures", model.textures, &json);
   SetIf("interpolation", model.interpolation, &json);
   SetIf("angle_inputs", model.angle_inputs, &json);
   SetIf("canonical_order", model.canonical_order, &json);
@@ -377,6 +386,23 @@ std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
   if (job.threads != defaults.threads) json["threads"] = job.threads;
   if (!job.report) json["report"] = false;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string CanonicalSvbrdfJob(const Job& job, nlohmann::ordered_json json) {
+  const svbrdf::SvbrdfShape shape = SvbrdfModelOfJob(job, 1, 1, AddressMode::kClamp);
+  json["model"] = {{"nside", shape.model.grid.nside},
+                   {"primitive_size", shape.model.primitive_size},
+                   {"index_bits", shape.model.index_bits},
+                   {"hidden", shape.model.hidden},
+                   {"hidden_layers", shape.model.hidden_layers},
+                   {"interpolation", InterpolationName(shape.model.grid.interpolation)},
+                   {"angle_inputs", shape.model.grid.angle_inputs},
+                   {"canonical_order", shape.model.grid.canonical_order},
+                   {"textures", shape.texture.textures}};
+  json["quality"] = QualityName(job.quality);
+  json["recipe"] = RecipeName(job.recipe);
+  json["seed"] = job.seed;
+  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
 std::string CanonicalBrdfJob(const Job& job, nlohmann::ordered_json json) {
@@ -403,7 +429,17 @@ std::string CanonicalBrdfJob(const Job& job, nlohmann::ordered_json json) {
 
 }  // namespace
 
-const char* JobKindName(JobKind kind) { return kind == JobKind::kBrdf ? "brdf" : "material"; }
+const char* JobKindName(JobKind kind) {
+  switch (kind) {
+    case JobKind::kBrdf:
+      return "brdf";
+    case JobKind::kSvbrdf:
+      return "svbrdf";
+    case JobKind::kMaterial:
+      break;
+  }
+  return "material";
+}
 
 const char* AddressModeName(AddressMode mode) {
   return mode == AddressMode::kWrap ? "wrap" : "clamp";
@@ -461,8 +497,10 @@ Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
   if (const Json* kind = reader.Find("kind", true)) {
     if (*kind == "brdf") {
       job.kind = JobKind::kBrdf;
+    } else if (*kind == "svbrdf") {
+      job.kind = JobKind::kSvbrdf;
     } else if (*kind != "material") {
-      reader.Complain("kind", "must be \"material\" or \"brdf\"; is " + Shown(*kind));
+      reader.Complain("kind", "must be \"material\", \"brdf\" or \"svbrdf\"; is " + Shown(*kind));
     }
   }
   reader.Text("asset", true, 100, &job.asset);
@@ -478,7 +516,7 @@ Result<Job> ParseJob(std::string_view text, const std::string& base_folder,
   uint64_t threads = 0;
   reader.Integer("threads", 0, kMaxThreads, &threads);
   reader.Flag("report", &job.report);
-  if (job.kind == JobKind::kBrdf) {
+  if (job.kind != JobKind::kMaterial) {
     ReadBrdfFields(&reader, &problems, &job);
   } else {
     ReadMaterialFields(&reader, &problems, &job);
@@ -518,7 +556,7 @@ std::string JobToJson(const Job& job) {
   json["version"] = kJobVersion;
   json["kind"] = JobKindName(job.kind);
   json["asset"] = job.asset;
-  if (job.kind == JobKind::kBrdf) return BrdfJobToJson(job, std::move(json));
+  if (job.kind != JobKind::kMaterial) return BrdfJobToJson(job, std::move(json));
   if (!job.folder.empty()) json["folder"] = job.folder;
   if (!job.set.empty()) json["set"] = job.set;
   if (!job.scene.empty()) json["scene"] = job.scene;
@@ -570,6 +608,7 @@ std::string CanonicalJob(const Job& job) {
   json["kind"] = JobKindName(job.kind);
   json["asset"] = job.asset;
   if (job.kind == JobKind::kBrdf) return CanonicalBrdfJob(job, std::move(json));
+  if (job.kind == JobKind::kSvbrdf) return CanonicalSvbrdfJob(job, std::move(json));
   json["maps"] = nlohmann::ordered_json::array();
   for (const JobMap& map : job.maps) {
     json["maps"].push_back({{"role", map.role},

@@ -43,19 +43,21 @@ struct JobModel {
   std::optional<int> index_bits;             // 1..12
   std::optional<int> hidden;                 // 4..256
   std::optional<int> hidden_layers;          // 1..4
+  std::optional<int> textures;               // 1..4, of a spatially varying BRDF
   std::optional<std::string> interpolation;  // "bilinear", "inverse_distance", "uniform"
   std::optional<bool> angle_inputs;
   std::optional<bool> canonical_order;
   std::optional<std::string> index_training;  // "clusters", "softmax", "clusters_then_softmax"
 };
 
-enum class JobKind { kMaterial, kBrdf };  // "material", "brdf"
+enum class JobKind { kMaterial, kBrdf, kSvbrdf };  // "material", "brdf", "svbrdf"
 
-// Fields marked [material] or [brdf] belong to jobs of that kind only.
+// Fields marked [material] or [brdf] belong to jobs of that kind only; those of BRDFs to spatially
+// varying ones, too.
 struct Job {
   JobKind kind = JobKind::kMaterial;
   std::string asset;
-  std::string file;    // [brdf] the table or list of measurements
+  std::string file;    // [brdf] the table or list of measurements, or the list of images
   JobModel model;      // [brdf]
   std::string folder;  // [material] of the maps; may be empty when `maps` is not
   std::string set;    // [material] name of the one meant when `folder` holds several materials; may
@@ -129,6 +131,6 @@ bool IsAssetName(std::string_view name);
 std::string AssetNameFromPath(const std::string& path);
 
 const char* AddressModeName(AddressMode mode);  // "wrap", "clamp"
-const char* JobKindName(JobKind kind);          // "material", "brdf"
+const char* JobKindName(JobKind kind);          // "material", "brdf", "svbrdf"
 
 }  // namespace patina

@@ -9,21 +9,20 @@
 #include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/job_sets.h"
 #include "pipeline/jobs/scene_job.h"
+#include "pipeline/svbrdf/image_set.h"
 
 namespace patina {
 namespace {
 
 PlannedJob PlanBrdf(const std::string& asset, const std::string& file) {
-  Job job;
-  job.kind = JobKind::kBrdf;
-  job.asset = asset;
-  job.file = file;
-  return {asset, std::move(job), true};
+  Job job = JobOfBrdfFile(asset, file);
+  const bool alone = job.kind == JobKind::kBrdf;
+  return {asset, std::move(job), alone};
 }
 
 // A file is a BRDF by its extension; a .json by its content, as job files end so, too.
 bool IsBrdf(const std::string& path) {
-  if (layered::IsLayersFileName(path)) return true;
+  if (layered::IsLayersFileName(path) || svbrdf::IsImageSetFileName(path)) return true;
   return LowerExtension(path) == ".json" ? IsMeasurementList(path) : brdf::HasBrdfExtension(path);
 }
 

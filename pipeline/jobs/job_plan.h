@@ -21,9 +21,10 @@ struct JobPlan {
   std::vector<std::string> skipped;  // subfolders without images and BRDF files
 };
 
-// input: a job file, a BRDF file, a scene (one job for each material), a folder of maps, or a
-// folder of such. What an input holds but cannot be baked is listed with its error. `except`: a
-// folder that is passed over, see FindAssets. Jobs of files and folders have no `out` yet.
+// input: a job file, a BRDF file, a list of images, a scene (one job for each material), a folder
+// of maps, or a folder of such. What an input holds but cannot be baked is listed with its error.
+// `except`: a folder that is passed over, see FindAssets. Jobs of files and folders have no `out`
+// yet.
 JobPlan PlanJobs(const std::string& input, const std::string& except);
 
 }  // namespace patina

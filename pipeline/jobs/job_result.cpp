@@ -28,6 +28,12 @@ Json BrdfJson(const BrdfSummary& brdf) {
           {"reciprocity", brdf.reciprocity},       {"albedo", brdf.albedo}};
 }
 
+Json SvbrdfJson(const SvbrdfSummary& svbrdf) {
+  return {{"image_mae", svbrdf.image_mae},   {"image_rmse", svbrdf.image_rmse},
+          {"image_ssim", svbrdf.image_ssim}, {"psnr", svbrdf.psnr_db},
+          {"log1p_mae", svbrdf.log1p_mae},   {"ratio", svbrdf.ratio}};
+}
+
 }  // namespace
 
 std::string JobResultToJson(const JobResult& result, int indent) {
@@ -58,8 +64,9 @@ std::string JobResultToJson(const JobResult& result, int indent) {
     json["stopped_by"] = result.stopped_by;
     if (!result.choice.empty()) json["choice"] = result.choice;
   }
-  if (result.psnr || result.brdf) json["bytes"] = result.bytes;
+  if (result.psnr || result.brdf || result.svbrdf) json["bytes"] = result.bytes;
   if (result.brdf) json["brdf"] = BrdfJson(*result.brdf);
+  if (result.svbrdf) json["svbrdf"] = SvbrdfJson(*result.svbrdf);
   if (result.psnr) {
     Json maps = Json::object();
     for (const auto& [role, db] : result.psnr->maps) maps[role] = db;

@@ -43,6 +43,14 @@ struct BrdfSummary {
   std::array<std::array<double, 3>, kAlbedoDegrees.size()> albedo{};
 };
 
+// How good a baked spatially varying BRDF is; see schemas/result.schema.json and MeasureSvbrdf.
+struct SvbrdfSummary {
+  double image_mae = 0, image_rmse = 0, image_ssim = 0;
+  double psnr_db = 0;
+  double log1p_mae = 0;
+  double ratio = 0;  // bytes of the images as halves to those of what an engine loads
+};
+
 struct JobResult {
   int exit_code = kExitDone;
   std::optional<Error> error;  // set exactly when exit_code is not kExitDone
@@ -63,6 +71,7 @@ struct JobResult {
   std::optional<PsnrSummary> psnr;
   std::optional<double> ssim, flip, normal_angle_deg;
   std::optional<BrdfSummary> brdf;
+  std::optional<SvbrdfSummary> svbrdf;
   std::vector<std::string> warnings;
 };
 

@@ -76,6 +76,13 @@ void AddBrdfs(const std::string& folder, const std::vector<std::string>& files, 
   }
 }
 
+// Adds the image sets of a folder. A folder that has any holds nothing else: its images are theirs.
+bool AddImageSets(const std::string& folder, FoundAssets* found) {
+  const std::vector<std::string> lists = FindImageSets(folder);
+  AddBrdfs(folder, lists, found->assets.size(), found);
+  return !lists.empty();
+}
+
 // Texture sets that no scene has claimed.
 void DropClaimed(const std::set<std::string>& claimed, std::vector<MapSet>* sets) {
   std::error_code ignored;
@@ -175,6 +182,7 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
                 folder + " is neither a folder nor a job file (*.json) nor a BRDF file");
   }
   FoundAssets found;
+  if (AddImageSets(folder, &found)) return found;
   PATINA_ASSIGN(const std::vector<std::string> brdfs, FindBrdfFiles(folder));
   std::set<std::string> claimed;
   AddScenes(folder, &found, &claimed);
@@ -197,7 +205,7 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
   AddBrdfs(folder, brdfs, 0, &found);
   PATINA_ASSIGN(const Folder content, ListFolder(folder));
   for (const std::string& subfolder : content.subfolders) {
-    if (SameFolder(subfolder, except)) continue;
+    if (SameFolder(subfolder, except) || AddImageSets(subfolder, &found)) continue;
     const size_t first = found.assets.size();
     auto inner_brdfs = FindBrdfFiles(subfolder);
     const std::vector<std::string> files = inner_brdfs ? *inner_brdfs : std::vector<std::string>();

@@ -173,13 +173,6 @@ RgbImage ForAPerson(const brdf::SphereImage& image) {
   return picture;
 }
 
-RgbImage DifferenceOf(const RgbImage& a, const RgbImage& b) {
-  RgbImage difference = a;
-  for (size_t i = 0; i < a.rgb.size(); ++i)
-    difference.rgb[i] = std::min(1.0f, kSheetDifferenceGain * std::fabs(a.rgb[i] - b.rgb[i]));
-  return difference;
-}
-
 brdf::SphereImage Enlarged(const brdf::SphereImage& image, int factor) {
   brdf::SphereImage large;
   large.side = image.side * factor;

@@ -12,9 +12,11 @@
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/measure.h"
 #include "pipeline/jobs/measure_brdf.h"
+#include "pipeline/jobs/measure_svbrdf.h"
 #include "pipeline/jobs/page_pictures.h"
 #include "pipeline/jobs/run_record.h"
 #include "pipeline/material/train.h"
+#include "pipeline/svbrdf/train_svbrdf.h"
 
 namespace patina {
 
@@ -38,6 +40,11 @@ std::string MaterialReportPage(const PageFacts& facts, const JobSource& source,
 std::string BrdfReportPage(const PageFacts& facts, const BrdfSource& source,
                            const BrdfMeasurement& measurement, const brdf::TrainedBrdf& model,
                            const PageTrio& sphere);
+
+// planes: of the measurement, in its order.
+std::string SvbrdfReportPage(const PageFacts& facts, const SvbrdfMeasurement& measurement,
+                             const svbrdf::TrainedSvbrdf& model,
+                             const std::vector<PageTrio>& planes);
 
 // The payloads in `directory` that engines load, compressed: what an archive of them would take.
 // One number for each payload, 0 for those that engines do not load. Errors: those of ReadFile and

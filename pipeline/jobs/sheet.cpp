@@ -1,6 +1,7 @@
 #include "pipeline/jobs/sheet.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include "pipeline/jobs/pixel_font.h"
@@ -38,6 +39,13 @@ void Write(std::string_view text, int left, int top, RgbImage* sheet) {
 }
 
 }  // namespace
+
+RgbImage DifferenceOf(const RgbImage& a, const RgbImage& b) {
+  RgbImage difference = a;
+  for (size_t i = 0; i < a.rgb.size(); ++i)
+    difference.rgb[i] = std::min(1.0f, kSheetDifferenceGain * std::fabs(a.rgb[i] - b.rgb[i]));
+  return difference;
+}
 
 RgbImage ComposeSheet(const std::string& title, std::span<const std::string> heads,
                       std::span<const SheetRow> rows) {

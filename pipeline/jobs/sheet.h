@@ -17,6 +17,9 @@ struct RgbImage {
 inline constexpr int kSheetTile = 192;            // pixels a side: the most that a picture has
 inline constexpr float kSheetDifferenceGain = 8;  // what differences are shown multiplied by
 
+// The difference of two pictures of one size, times kSheetDifferenceGain.
+RgbImage DifferenceOf(const RgbImage& a, const RgbImage& b);
+
 struct SheetRow {
   std::string label;
   std::vector<const RgbImage*> pictures;  // by column, at most as many as there are heads

@@ -9,6 +9,7 @@
 #include "pipeline/jobs/brdf_package.h"
 #include "pipeline/jobs/compare.h"
 #include "pipeline/jobs/measure_brdf.h"
+#include "pipeline/jobs/svbrdf_package.h"
 #include "pipeline/validate/check_container.h"
 
 namespace patina::validate {
@@ -46,7 +47,7 @@ Job SourceFor(const Job& source, const Manifest& manifest) {
   if (!fs::is_directory(folder, ignored)) return job;
   job.file.clear();
   if (manifest.brdf) {
-    job.kind = JobKind::kBrdf;
+    job.kind = manifest.brdf->images ? JobKind::kSvbrdf : JobKind::kBrdf;
     job.folder.clear();
     if (!manifest.brdf->files.empty()) {
       const std::string& name = manifest.brdf->files[0].path;
@@ -85,6 +86,28 @@ void RemeasureBrdf(const Container& container, const Job& job, ThreadPool& pool,
                findings);
 }
 
+void RemeasureSvbrdf(const Container& container, const Job& job, ThreadPool& pool,
+                     const CancelToken& cancel, ProgressSink& progress, const std::string& file,
+                     FindingList* findings) {
+  const auto refuse = [&](const Error& error) { findings->Add(6102, file, {}, error.message); };
+  const auto source = ReadSvbrdfSource(job, pool, cancel);
+  if (!source) return refuse(source.error());
+  const ManifestBrdf& model = *container.manifest.brdf;
+  if (model.images->sha256 != source->images_sha256) {
+    findings->Add(1401, file, {"/source/images", {}},
+                  "the images are not those that the container was baked from");
+  }
+  const auto measured = MeasureSvbrdf(container.directory, source->set, pool, cancel, progress);
+  if (!measured) return refuse(measured.error());
+  ManifestBrdf again;
+  DescribeSvbrdfQuality(*measured, &again);
+  const ManifestBrdfQuality& was = model.quality;
+  const ManifestBrdfQuality& is = again.quality;
+  CompareError("/quality/image_mae", was.image_mae, is.image_mae, file, findings);
+  CompareError("/quality/image_rmse", was.image_rmse, is.image_rmse, file, findings);
+  CompareError("/quality/log1p_mse", was.log1p_mse, is.log1p_mse, file, findings);
+}
+
 }  // namespace
 
 void Remeasure(const Target& target, const Job& source, ThreadPool& pool, const CancelToken& cancel,
@@ -99,6 +122,8 @@ void Remeasure(const Target& target, const Job& source, ThreadPool& pool, const 
   const Manifest& manifest = container->manifest;
   const std::string file = JoinLabel(target.label, kManifestName);
   const Job job = SourceFor(source, manifest);
+  if (manifest.brdf && manifest.brdf->images)
+    return RemeasureSvbrdf(*container, job, pool, cancel, progress, file, findings);
   if (manifest.brdf) return RemeasureBrdf(*container, job, pool, cancel, progress, file, findings);
   const auto compared = CompareContainer(target.path, job, pool, cancel, progress);
   if (!compared) {

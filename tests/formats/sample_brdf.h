@@ -14,6 +14,7 @@
 #include "formats/index_pack.h"
 #include "formats/manifest.h"
 #include "formats/weights.h"
+#include "tests/formats/sample_container.h"
 #include "tests/formats/test_support.h"
 
 namespace patina::test {
@@ -129,6 +130,7 @@ struct BrdfSampleOptions {
   std::vector<int> hidden = {16, 16};
   bool shared_codebook = false;
   bool with_sampler = true;
+  int textures = 0;  // of a spatially varying one
   int zstd_level = 0;
 };
 
@@ -162,6 +164,19 @@ inline Result<StagingArea> StageBrdfSample(const std::string& out, const std::st
   brdf.half_vector_inputs = pack.half_vector_inputs;
   brdf.layers = {2 * pack.primitive_size + (pack.angle_inputs ? 3 : 0) +
                  (pack.half_vector_inputs ? 2 : 0)};
+  if (options.textures > 0) {
+    constexpr int kWidth = 13, kHeight = 9;
+    manifest.kind = "svbrdf";
+    brdf.images = ManifestImageSet{7, kWidth, kHeight, "wrap", std::string(64, '7')};
+    brdf.layers[0] += 3 * options.textures;
+    for (int t = 0; t < options.textures; ++t) {
+      const std::string name = "features_" + std::to_string(t) + ".dds";
+      const auto levels = FeatureLevels(random, kWidth, kHeight);
+      PATINA_ASSIGN(const auto dds, EncodeDds(bc6h::Format::kUf16, kWidth, kHeight, levels));
+      PATINA_TRY(staging.AddPayload(name, "features", dds));
+      manifest.features.push_back({name, kWidth, kHeight, static_cast<int>(levels.size())});
+    }
+  }
   brdf.layers.insert(brdf.layers.end(), options.hidden.begin(), options.hidden.end());
   brdf.layers.push_back(3);
   PATINA_ASSIGN(const auto weights, EncodeWeights(RandomLayers(random, brdf.layers)));

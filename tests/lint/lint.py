@@ -21,9 +21,10 @@ PIPELINE_TIERS = {
     "kernels": 1,
     "bc6": 2, "color": 2, "effects": 2, "healpix": 2, "image": 2, "metrics": 2, "nn": 2,
     "brdf": 3, "layered": 3, "material": 3, "report": 3,
-    "jobs": 4,
-    "client": 5, "tradeoff": 5, "validate": 5,
-    "cli": 6,
+    "svbrdf": 4,
+    "jobs": 5,
+    "client": 6, "tradeoff": 6, "validate": 6,
+    "cli": 7,
 }
 # The same of daemon/; what lies directly in it (main.cpp) may use all of them.
 DAEMON_TIERS = {
@@ -51,7 +52,7 @@ MISSING_HEADERS = {"expected", "format", "generator", "mdspan", "print", "ranges
 
 # Headers that users copy, however long. Their tests, as users do, and they themselves include them by their bare names.
 STANDALONE = {"formats/decoder/patina_brdf_decoder.h", "formats/decoder/patina_brdf_sampler.h",
-              "formats/decoder/patina_decoder.h"}
+              "formats/decoder/patina_decoder.h", "formats/decoder/patina_svbrdf_decoder.h"}
 
 MAX_LINES = 800
 CPP_SUFFIXES = (".h", ".cpp", ".inl")

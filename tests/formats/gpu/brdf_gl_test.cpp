@@ -60,6 +60,19 @@ TEST_P(BrdfOnGl45, AgreesForAnyNsideAndPrimitive) {
   }
 }
 
+TEST_P(BrdfOnGl, AgreesForSpatiallyVaryingOnes) {
+  test::BrdfSampleOptions options;
+  options.pack.isotropic = options.pack.canonical_order = false;
+  options.pack.half_vector_inputs = true;
+  options.textures = 4;
+  Check(options, 170);
+  if (GetParam() == GlApi::kEs30) return;
+  options.pack.angle_inputs = options.pack.half_vector_inputs = false;
+  options.pack.primitive_size = 3;
+  options.textures = 1;
+  Check(options, 171);
+}
+
 TEST_P(BrdfOnGl, AgreesForAnyNetwork) {
   // In ES the last one is too large for a constant buffer.
   const std::vector<std::vector<int>> networks =

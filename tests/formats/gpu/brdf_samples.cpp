@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "formats/decoder/patina_brdf_decoder.h"
+#include "formats/decoder/patina_svbrdf_decoder.h"
 
 namespace patina::gpu_test {
 namespace {
@@ -85,16 +86,27 @@ void CheckBrdf(const test::BrdfSampleOptions& options, uint64_t seed, size_t cou
   ASSERT_OK(published);
   const auto container = OpenContainer(published->directory);
   ASSERT_OK(container);
+  const bool varies = options.textures > 0;
   BrdfDecoder decoder;
+  SvbrdfDecoder varying;
   std::string problem;
-  ASSERT_EQ(BrdfDecoder::Load(container->directory, &decoder, &problem),
-            BrdfDecoder::LoadStatus::kOk)
-      << problem;
+  if (varies) {
+    ASSERT_EQ(SvbrdfDecoder::Load(container->directory, &varying, &problem),
+              SvbrdfDecoder::LoadStatus::kOk)
+        << problem;
+  } else {
+    ASSERT_EQ(BrdfDecoder::Load(container->directory, &decoder, &problem),
+              BrdfDecoder::LoadStatus::kOk)
+        << problem;
+  }
   ShaderOptions shader;
   shader.language = language;
   GpuProgram program = LoadProgram(*container, shader);
-  SetBrdfBody(&program);
-  const std::vector<float> pairs = RandomPairs(seed, count);
+  SetBrdfBody(&program, varies);
+  std::vector<float> pairs = RandomPairs(seed, count);
+  // Where a spatially varying one is looked up: u and v, of which the level follows.
+  Random random(seed + 1);
+  for (size_t i = 3; i < pairs.size(); i += 4) pairs[i] = static_cast<float>(random.Unit());
   const std::vector<float> from_gpu = run(program, pairs);
   ASSERT_EQ(from_gpu.size(), 3 * count);
 
@@ -103,7 +115,13 @@ void CheckBrdf(const test::BrdfSampleOptions& options, uint64_t seed, size_t cou
   double range = 0;
   std::vector<float> expected(3 * count);
   for (size_t i = 0; i < count; ++i) {
-    decoder.Evaluate(&pairs[8 * i], &pairs[8 * i + 4], &expected[3 * i]);
+    const float *wi = &pairs[8 * i], *wo = &pairs[8 * i + 4];
+    if (varies) {
+      varying.Evaluate(wi, wo, static_cast<double>(wi[3]), static_cast<double>(wo[3]),
+                       static_cast<double>(5 * wi[3] - 1), &expected[3 * i]);
+    } else {
+      decoder.Evaluate(wi, wo, &expected[3 * i]);
+    }
     for (size_t c = 0; c < 3; ++c)
       range = std::max(range, std::log1p(static_cast<double>(expected[3 * i + c])));
   }

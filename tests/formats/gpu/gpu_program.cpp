@@ -95,10 +95,12 @@ void SetMaterialBody(GpuProgram* program, int channels) {
       std::to_string(channels) + "; ++c) result[c] = material.value[c];\n";
 }
 
-void SetBrdfBody(GpuProgram* program) {
+void SetBrdfBody(GpuProgram* program, bool varies) {
   program->outputs = 3;
   program->body =
-      "PATINA_VEC3 f = patina_brdf(in0.xyz, in1.xyz);\n"
+      std::string("PATINA_VEC3 f = ") +
+      (varies ? "patina_svbrdf(in0.xyz, in1.xyz, PATINA_VEC2(in0.w, in1.w), 5.0 * in0.w - 1.0);\n"
+              : "patina_brdf(in0.xyz, in1.xyz);\n") +
       "result[0] = f.x; result[1] = f.y; result[2] = f.z;\n";
 }
 

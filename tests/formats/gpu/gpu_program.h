@@ -49,9 +49,10 @@ GpuProgram LoadProgram(const Container& container, const ShaderOptions& options)
 // Runs a program for items of eight floats (in0, in1): program.outputs floats each.
 using RunProgram = std::function<std::vector<float>(const GpuProgram&, const std::vector<float>&)>;
 
-// The body for materials: in0 = (u, v, s, -), all channels; and for BRDFs: in0 = wi, in1 = wo.
+// The body for materials: in0 = (u, v, s, -), all channels; and for BRDFs: in0 = wi, in1 = wo, of
+// spatially varying ones with u and v behind them and s = 5 u - 1.
 void SetMaterialBody(GpuProgram* program, int channels);
-void SetBrdfBody(GpuProgram* program);
+void SetBrdfBody(GpuProgram* program, bool varies = false);
 
 // True if the named Debian package is installed, and so a test that needs it may not be skipped.
 bool IsInstalled(const std::string& package);

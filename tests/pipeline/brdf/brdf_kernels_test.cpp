@@ -17,20 +17,30 @@ namespace {
 
 struct Shape {
   int primitive_size, extra_inputs, hidden, hidden_layers;
+  int texture_inputs = 0;
 };
 
-constexpr Shape kShapes[] = {
-    {16, 3, 32, 2}, {16, 0, 64, 3}, {8, 3, 24, 1}, {20, 5, 16, 2}, {1, 0, 4, 1}};
-constexpr int kCorners = 40;
+constexpr Shape kShapes[] = {{16, 3, 32, 2},
+                             {16, 0, 64, 3},
+                             {8, 3, 24, 1},
+                             {20, 5, 16, 2},
+                             {1, 0, 4, 1},
+                             // With a neural texture, of one and of four textures.
+                             {16, 5, 32, 2, 12},
+                             {5, 0, 8, 1, 3}};
+constexpr int kCorners = 40, kTexels = 21;
 
 // A network, features and a chunk of samples from a seed.
 struct Case {
   Case(const Shape& shape, int count, uint64_t seed)
-      : layout(shape.primitive_size, shape.extra_inputs, shape.hidden, shape.hidden_layers),
+      : layout(shape.primitive_size, shape.extra_inputs, shape.hidden, shape.hidden_layers,
+               shape.texture_inputs),
         parameters(layout.parameter_count),
         transposed(layout.transposed_count),
         features(static_cast<size_t>(kCorners) * layout.feature_stride),
         samples(count),
+        texels(static_cast<size_t>(kTexels) * layout.texture_stride),
+        taps(layout.texture_stride > 0 ? count : 0),
         scratch(layout),
         result(layout) {
     Rng rng(seed);
@@ -59,6 +69,16 @@ struct Case {
       sample.cosine = rng.Uniform();
       sample.importance = 0.5f + rng.Uniform();
     }
+    for (int t = 0; t < kTexels; ++t) {
+      for (int k = 0; k < layout.texture_inputs; ++k)
+        texels[static_cast<size_t>(t) * layout.texture_stride + k] = uniform(1);
+    }
+    for (size_t s = 0; s < taps.size(); ++s) {
+      for (int c = 0; c < 8; ++c) {
+        taps[s].row[c] = static_cast<int32_t>(rng.Below(kTexels));
+        taps[s].weight[c] = c == 3 ? 0 : rng.Uniform();
+      }
+    }
     TransposeWeights(layout, parameters.data(), transposed.data());
   }
 
@@ -70,12 +90,26 @@ struct Case {
     task.features = features.data();
     task.samples = samples.data();
     task.count = static_cast<int>(samples.size());
+    if (taps.size() > 0) {
+      task.texture = texels.data();
+      task.taps = taps.data();
+    }
     return task;
+  }
+
+  // y of a sample by the reference.
+  template <class S>
+  void Reference(const std::vector<S>& weights, const std::vector<S>& corners,
+                 const std::vector<S>& texture, int s, S* y) const {
+    ForwardReference(layout, weights.data(), corners.data(), samples[s], y, texture.data(),
+                     taps.size() > 0 ? &taps[s] : nullptr);
   }
 
   NetworkLayout layout;
   AlignedBuffer<float> parameters, transposed, features;
   AlignedBuffer<PoolSample> samples;
+  AlignedBuffer<float> texels;
+  AlignedBuffer<TexelTaps> taps;
   ChunkScratch scratch;
   ChunkResult result;
 };
@@ -103,9 +137,10 @@ TEST_P(BrdfKernelsTest, ForwardAgreesWithTheReferenceForEveryShapeAndCount) {
       std::vector<double> parameters(c.parameters.data(),
                                      c.parameters.data() + c.parameters.size());
       std::vector<double> features(c.features.data(), c.features.data() + c.features.size());
+      std::vector<double> texels(c.texels.data(), c.texels.data() + c.texels.size());
       for (int s = 0; s < count; ++s) {
         double y[kOutputs];
-        ForwardReference(c.layout, parameters.data(), features.data(), c.samples[s], y);
+        c.Reference(parameters, features, texels, s, y);
         for (int o = 0; o < kOutputs; ++o) {
           // Sums of at most 150 terms of about one: single precision loses some ulps of the sum of
           // their sizes.
@@ -126,11 +161,12 @@ TEST_P(BrdfKernelsTest, GradientsAgreeWithTheComplexStep) {
     kernels().train_chunk(c.Task(), &c.scratch, &c.result);
     std::vector<Complex> parameters(c.parameters.data(), c.parameters.data() + c.parameters.size());
     std::vector<Complex> features(c.features.data(), c.features.data() + c.features.size());
+    std::vector<Complex> texels(c.texels.data(), c.texels.data() + c.texels.size());
     const auto loss = [&] {
       Complex sum = 0;
       for (int s = 0; s < kCount; ++s) {
         Complex y[kOutputs];
-        ForwardReference(c.layout, parameters.data(), features.data(), c.samples[s], y);
+        c.Reference(parameters, features, texels, s, y);
         sum += LossReference(c.samples[s], y);
       }
       return sum;
@@ -159,6 +195,19 @@ TEST_P(BrdfKernelsTest, GradientsAgreeWithTheComplexStep) {
       const double wanted = loss().imag() / kStep;
       features[i] = features[i].real();
       EXPECT_NEAR(static_cast<double>(gradient[i]), wanted, 3e-5 * scale) << i;
+    }
+    // And by the texels.
+    AlignedBuffer<float> by_texel(c.texels.size());
+    if (c.taps.size() > 0)
+      kernels().scatter_texels(c.layout, c.taps.data(), kCount, c.result, by_texel.data());
+    scale = 0;
+    for (size_t i = 0; i < by_texel.size(); ++i)
+      scale = std::max(scale, std::abs(static_cast<double>(by_texel[i])));
+    for (size_t i = 0; i < texels.size(); i += 3) {
+      texels[i] += Complex(0, kStep);
+      const double wanted = loss().imag() / kStep;
+      texels[i] = texels[i].real();
+      EXPECT_NEAR(static_cast<double>(by_texel[i]), wanted, 3e-5 * scale) << i;
     }
   }
 }
@@ -256,7 +305,7 @@ TEST(BrdfKernels, GiveTheSameBitsOnBothTargets) {
                                a.result.weight_gradient.size() * sizeof(float)));
       EXPECT_EQ(
           0, std::memcmp(a.result.feature_gradient.data(), b.result.feature_gradient.data(),
-                         static_cast<size_t>(count) * 2 * a.layout.feature_stride * sizeof(float)));
+                         static_cast<size_t>(count) * a.layout.feature_columns() * sizeof(float)));
     }
   }
 }

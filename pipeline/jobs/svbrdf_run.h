@@ -1,0 +1,17 @@
+// Jobs of kind "svbrdf": from a set of measured images to a published container.
+#pragma once
+
+#include "pipeline/base/progress.h"
+#include "pipeline/jobs/event_log.h"
+#include "pipeline/jobs/job.h"
+#include "pipeline/jobs/job_result.h"
+#include "pipeline/jobs/run_guards.h"
+
+namespace patina {
+
+// Stages: ingest (read the list, hash and read the images), train, package, verify (decode the
+// written bytes and measure them), report, publish.
+JobResult RunSvbrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
+                       const RunGuards& guards);
+
+}  // namespace patina
