@@ -21,6 +21,8 @@ int TradeoffCommand(const CommandLine& line, const CancelToken& cancel);
 int PackCommand(const CommandLine& line, const CancelToken& cancel);
 int UnpackArchiveCommand(const CommandLine& line, const CancelToken& cancel);
 int ValidateCommand(const CommandLine& line, const CancelToken& cancel);
+// Becomes the program patina-view; returns only if that cannot be started.
+int ViewCommand(const CommandLine& line);
 
 // "patina: error: <message>" on standard error.
 void PrintError(const std::string& message);

@@ -59,6 +59,8 @@ int Dispatch(const CommandLine& line) {
       return UnpackArchiveCommand(line, g_cancel);
     case Command::kValidate:
       return ValidateCommand(line, g_cancel);
+    case Command::kView:
+      return ViewCommand(line);
     case Command::kSubmit:
       return SubmitCommand(line.client, g_cancel);
     case Command::kJobs:

@@ -24,6 +24,7 @@ constexpr const char* kExamples =
     "  patina bake scene.glb --out baked                every material of a glTF scene\n"
     "  patina bake chrome.binary steel.bsdf --out baked bake measured BRDFs\n"
     "  patina info baked/sample                         what a container holds and how good it is\n"
+    "  patina view baked/sample                         look at it in the browser, lit\n"
     "  patina unpack baked/sample --out maps            the maps back as images\n"
     "  patina compare baked/sample sample               measure a container against its source "
     "again\n"
@@ -55,7 +56,8 @@ constexpr const char* kBakeFooter =
     "  patina bake merl/*.binary brushed.bsdf --out baked\n"
     "  patina bake layered/car_paint.layers.json --out baked --quality reference\n"
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
-    "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches it\n"
+    "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches "
+    "it\n"
     "  patina bake wall --out baked --size-budget 400k --time-budget 60\n"
     "\n"
     "The colour space of a colour map is what the map list says; else --color-space; else a word "
@@ -557,6 +559,7 @@ void AddClientCommands(CLI::App* app, CommandLine* line) {
 #include "pipeline/cli/options_pack.inl"
 #include "pipeline/cli/options_tradeoff.inl"
 #include "pipeline/cli/options_validate.inl"
+#include "pipeline/cli/options_view.inl"
 
 }  // namespace
 
@@ -583,6 +586,7 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   AddTradeoff(&app, &line);
   AddPack(&app, &line);
   AddValidate(&app, &line);
+  AddView(&app, &line);
   AddClientCommands(&app, &line);
   std::string topic;
   CLI::App* help = app.add_subcommand("help", "Explain a command");
