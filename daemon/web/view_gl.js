@@ -1,8 +1,17 @@
 // WebGL 2 in small: context, programs, textures, geometry, and reading back.
 import {decodeLevel} from "./view_bc6h.js";
 
+// Smooth edges cost nothing worth mentioning on a graphics card, and much without one.
+function hasCard() {
+  const gl = typeof OffscreenCanvas === "function" ? new OffscreenCanvas(1, 1).getContext("webgl2") : null;
+  const names = gl && gl.getExtension("WEBGL_debug_renderer_info");
+  const isSoft = Boolean(names) && /swiftshader|llvmpipe|software|basic render/i.test(gl.getParameter(names.UNMASKED_RENDERER_WEBGL));
+  if (gl) gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return !isSoft;
+}
+
 export function openContext(canvas) {
-  const gl = canvas.getContext("webgl2", {alpha: true, antialias: true, premultipliedAlpha: true, powerPreference: "high-performance"});
+  const gl = canvas.getContext("webgl2", {alpha: true, antialias: hasCard(), premultipliedAlpha: true, powerPreference: "high-performance"});
   if (!gl) {
     throw new Error("This browser gives the page no WebGL 2. Turn on hardware acceleration in its settings, update it or the " +
       "graphics driver, or start Chromium with --enable-unsafe-swiftshader, which needs no graphics card. Until then the " +

@@ -208,6 +208,26 @@ ${values.join("\n")}
 }`;
 }
 
+// The decoder with the layers of its network written out, product by product in the same order: software renderers take
+// several times as long for arrays that a loop walks through. Networks whose weights are a texture keep their loops.
+export function writtenOut(shader) {
+  const found = /#define PATINA_(MATERIAL|BRDF)_LAYERS(.*)/.exec(shader);
+  if (!found || shader.includes(`#define PATINA_${found[1]}_WEIGHTS_SHIFT`)) return shader;
+  const [matrix, vector] = [`PATINA_${found[1]}_MATRIX`, `PATINA_${found[1]}_VECTOR`];
+  const layers = [...found[2].matchAll(/_LAYER\((\d+), (\d+), (\d+), (\d+)\)/g)].map(([, ...numbers]) => {
+    const [inputs, outputs, m, v] = numbers.map(Number);
+    const lines = [];
+    for (let o = 0; o < outputs; ++o) {
+      let sum = `${vector}(${v + o})`;
+      for (let i = 0; i < inputs; ++i) sum += ` + PATINA_MUL(${matrix}(${m + o * inputs + i}), x[${i}])`;
+      lines.push(`y[${o}] = ${sum};`);
+    }
+    for (let o = 0; o < outputs; ++o) lines.push(`x[${o}] = max(y[${o}], vec4(0.0));`);
+    return lines.join(" ");
+  });
+  return shader.replace(found[0], `#define PATINA_${found[1]}_LAYERS ${layers.join(" ")}`);
+}
+
 // {vertex, fragment, names: what u_show = 0, 1, ... is} for a material.
 export function materialShaders({manifest, shader, source}) {
   const maps = mapsOf(manifest);

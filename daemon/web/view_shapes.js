@@ -33,7 +33,7 @@ export function cube() {
 }
 
 // turns: how often the texture goes round.
-export function sphere(turns, across = 128, down = 64) {
+export function sphere(turns, across = 80, down = 40) {
   const shape = empty();
   for (let row = 0; row <= down; ++row) {
     const theta = Math.PI * row / down;

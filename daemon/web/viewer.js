@@ -7,8 +7,9 @@ import {Controls} from "./view_controls.js";
 import {listen} from "./view_pointer.js";
 import {Scene} from "./view_scene.js";
 
-// Of one frame while something is dragged; what takes longer is drawn smaller until it is let go.
-const SMOOTH_MS = 40;
+// Of one frame while something is dragged, and of one that stays: what takes longer is drawn smaller.
+const SMOOTH_MS = 40, PATIENT_MS = 600, LEAST_SCALE = 0.2;
+const WEIGHED_SIDE = 128;
 const MOST_SIDE = 1600;
 const MEASURED_FRAMES = 8;
 
@@ -21,13 +22,15 @@ const element = id => document.getElementById(id);
 const canvas = element("view");
 const state = {...START};
 let scene = null, container = null, controls = null;
-let scale = 1, perPixelMs = 0, isMoving = false, isWaiting = false, isLost = false;
+let perPixelMs = 0, isMoving = false, isWaiting = false, isLost = false;
 
 // ---- drawing
 
 function fit() {
   const box = element("frame").getBoundingClientRect();
-  const ratio = Math.min(devicePixelRatio || 1, MOST_SIDE / Math.max(box.width, box.height)) * (isMoving ? scale : 1);
+  const full = Math.min(devicePixelRatio || 1, MOST_SIDE / Math.max(box.width, box.height));
+  const cost = perPixelMs * box.width * box.height * full * full;
+  const ratio = full * Math.min(1, Math.max(LEAST_SCALE, Math.sqrt((isMoving ? SMOOTH_MS : PATIENT_MS) / Math.max(cost, 1e-6))));
   const [width, height] = [box.width, box.height].map(side => Math.max(1, Math.round(side * ratio)));
   if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
 }
@@ -43,12 +46,10 @@ function draw() {
   });
 }
 
-// What a frame costs here decides how large it is drawn while it moves.
+// What a frame costs here decides how large it is drawn.
 function weigh() {
-  fit();
-  const pixels = canvas.width * canvas.height;
-  perPixelMs = scene.measure(state, 1) / pixels;
-  scale = Math.min(1, Math.max(0.3, Math.sqrt(SMOOTH_MS / Math.max(perPixelMs * pixels, 1e-6))));
+  canvas.width = canvas.height = WEIGHED_SIDE;
+  perPixelMs = scene.measure(state, 1) / (WEIGHED_SIDE * WEIGHED_SIDE);
 }
 
 function measureCost() {

@@ -360,8 +360,8 @@ def bake(patina, scratch):
     """Containers by name, and the maps of the first."""
     run = lambda *arguments: subprocess.run([patina, *arguments, "-q"], check=True, stdout=subprocess.DEVNULL)
     at = lambda name: os.path.join(scratch, name)
-    run("sample", "--kind", "all", "--out", at("wall"), "--size", "128")
-    run("sample", "--kind", "material", "--out", at("odd"), "--size", "100")
+    run("sample", "--kind", "all", "--out", at("wall"), "--size", "64")
+    run("sample", "--kind", "material", "--out", at("odd"), "--size", "36")
     run("sample", "--kind", "scene", "--out", at("scene"), "--size", "64")
     brdf = sorted(name for name in os.listdir(at("wall/brdf")) if name.endswith((".bsdf", ".csv", ".binary", ".json")))[0]
     common = ["--quality", "preview", "--no-report", "--out", at("baked")]
@@ -372,7 +372,7 @@ def bake(patina, scratch):
             shutil.copy(os.path.join(at("wall"), name), maps)
     run("bake", maps, *common)
     run("bake", at("odd"), *common)
-    run("bake", at("scene/mosaic.gltf"), *common)
+    run("bake", at("scene/mosaic.gltf"), "--material", "wet floor", *common)
     run("bake", os.path.join(at("wall/brdf"), brdf), *common)
     containers = {}
     for name in sorted(os.listdir(at("baked"))):
