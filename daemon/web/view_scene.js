@@ -1,6 +1,6 @@
 // A container on the graphics card: draws it, and reads values back.
 import {containerTexture, floatTexture, halfTexture, makeMesh, makeProgram, openContext, readFloats, setFilters} from "./view_gl.js";
-import {brdfProbe, brdfShaders, lobeShaders, materialProbe, materialShaders, writtenOut} from "./view_shaders.js";
+import {brdfProbe, brdfShaders, lobeShaders, materialProbe, materialShaders} from "./view_shaders.js";
 import {cube, hemisphere, plane, sphere} from "./view_shapes.js";
 
 const LOBE_ACROSS = 96, LOBE_DOWN = 48;
@@ -20,7 +20,7 @@ export function lightPlace({lightX, lightY}) {
 export class Scene {
   constructor(canvas, container) {
     this.canvas = canvas;
-    this.container = {...container, shader: writtenOut(container.shader)};
+    this.container = container;
     this.kind = container.manifest.kind;
     this.begin();
   }

@@ -208,24 +208,23 @@ ${values.join("\n")}
 }`;
 }
 
-// The decoder with the layers of its network written out, product by product in the same order: software renderers take
-// several times as long for arrays that a loop walks through. Networks whose weights are a texture keep their loops.
-export function writtenOut(shader) {
-  const found = /#define PATINA_(MATERIAL|BRDF)_LAYERS(.*)/.exec(shader);
-  if (!found || shader.includes(`#define PATINA_${found[1]}_WEIGHTS_SHIFT`)) return shader;
-  const [matrix, vector] = [`PATINA_${found[1]}_MATRIX`, `PATINA_${found[1]}_VECTOR`];
-  const layers = [...found[2].matchAll(/_LAYER\((\d+), (\d+), (\d+), (\d+)\)/g)].map(([, ...numbers]) => {
+// The decoder of a material with the layers of its network written out, product by product in the same order: software
+// renderers take several times as long for arrays that a loop walks through. Weights in a texture keep their loops.
+function writtenOut(shader) {
+  const found = /#define PATINA_MATERIAL_LAYERS(.*)/.exec(shader);
+  if (!found || shader.includes("#define PATINA_MATERIAL_WEIGHTS_SHIFT")) return shader;
+  const layers = [...found[1].matchAll(/_LAYER\((\d+), (\d+), (\d+), (\d+)\)/g)].map(([, ...numbers]) => {
     const [inputs, outputs, m, v] = numbers.map(Number);
     const lines = [];
     for (let o = 0; o < outputs; ++o) {
-      let sum = `${vector}(${v + o})`;
-      for (let i = 0; i < inputs; ++i) sum += ` + PATINA_MUL(${matrix}(${m + o * inputs + i}), x[${i}])`;
+      let sum = `PATINA_MATERIAL_VECTOR(${v + o})`;
+      for (let i = 0; i < inputs; ++i) sum += ` + PATINA_MUL(PATINA_MATERIAL_MATRIX(${m + o * inputs + i}), x[${i}])`;
       lines.push(`y[${o}] = ${sum};`);
     }
     for (let o = 0; o < outputs; ++o) lines.push(`x[${o}] = max(y[${o}], vec4(0.0));`);
     return lines.join(" ");
   });
-  return shader.replace(found[0], `#define PATINA_${found[1]}_LAYERS ${layers.join(" ")}`);
+  return shader.replace(found[0], `#define PATINA_MATERIAL_LAYERS ${layers.join(" ")}`);
 }
 
 // {vertex, fragment, names: what u_show = 0, 1, ... is} for a material.
@@ -236,7 +235,7 @@ export function materialShaders({manifest, shader, source}) {
   const cutoff = scene.alpha_mode === "mask" ? `  if (u_show == 0 && look_of(m).opacity < ${number(scene.alpha_cutoff ?? 0.5)}) discard;` : "";
   const hasAlpha = maps.some(map => map.map === "opacity") && scene.alpha_mode !== "opaque" && scene.alpha_mode !== "mask";
   const fragment = `${VERSION}#define PATINA_DERIVATIVES
-${shader}
+${writtenOut(shader)}
 uniform int u_show, u_compare;   // u_compare: 0 decoded, 1 source, 2 wipe, 3 difference
 uniform float u_wipe, u_gain, u_mip;
 in vec3 v_place, v_normal, v_tangent;
@@ -314,7 +313,7 @@ void main() {
 // Values at places, as floats: column x is place x, row y channels 4y to 4y + 3.
 export function materialProbe({manifest, shader, source}) {
   const count = manifest.channels.length;
-  return {vertex: COVER, fragment: `${VERSION}${shader}
+  return {vertex: COVER, fragment: `${VERSION}${writtenOut(shader)}
 uniform highp sampler2D u_places;   // u, v, mip, 1 for the source
 out vec4 o_values;
 ${sourceOf(manifest, source)}

@@ -9,7 +9,7 @@ import {Scene} from "./view_scene.js";
 
 // Of one frame while something is dragged, and of one that stays: what takes longer is drawn smaller.
 const SMOOTH_MS = 40, PATIENT_MS = 600, LEAST_SCALE = 0.2;
-const WEIGHED_SIDE = 128;
+const WEIGHED_SIDE = 64;
 const MOST_SIDE = 1600;
 const MEASURED_FRAMES = 8;
 

@@ -427,9 +427,9 @@ def use(page, patina, decoder_values, scratch, folder):
     viewer = Viewer(patina, containers["odd"])
     try:
         with open(damaged, "r+b") as file:
-            file.seek(400)
+            file.seek(160)
             byte = file.read(1)
-            file.seek(400)
+            file.seek(160)
             file.write(bytes([byte[0] ^ 0x40]))
         page.open(viewer.url)
         page.wait_until("document.querySelector('#trouble [role=alert]')", "word of the damaged file")
