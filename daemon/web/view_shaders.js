@@ -299,14 +299,14 @@ export function lobeShaders() {
   const fragment = `${VERSION}precision highp float;
 in vec3 v_place, v_normal;
 in vec2 v_uv;
-flat in vec3 v_color;
+in vec3 v_color;
 out vec4 o_color;
 void main() {
   vec3 n = normalize(v_normal);
   float shade = 0.55 + 0.45 * abs(dot(n, normalize(vec3(-0.3, 0.5, 0.8))));
   o_color = vec4(pow(clamp(v_color, 0.0, 1.0), vec3(1.0 / 2.2)) * shade, 1.0);
 }`;
-  const vertex = VERTEX.replace("out vec2 v_uv;", "out vec2 v_uv;\nflat out vec3 v_color;").replace("v_uv = a_uv * u_repeat;", "v_uv = a_uv * u_repeat;\n  v_color = a_tangent;");
+  const vertex = VERTEX.replace("out vec2 v_uv;", "out vec2 v_uv;\nout vec3 v_color;").replace("v_uv = a_uv * u_repeat;", "v_uv = a_uv * u_repeat;\n  v_color = a_tangent;");
   return {vertex, fragment};
 }
 

@@ -15,7 +15,7 @@ const MEASURED_FRAMES = 8;
 
 const START = {
   shape: "sphere", show: "lit", compare: "decoded", wipe: 0.5, gain: 8, exposure: 0, light: 2, studio: 1, lightX: -0.45, lightY: 0.5,
-  yaw: 0, pitch: 0, zoom: 1, panX: 0, panY: 0, repeat: 1, mip: -1, smooth: true, drag: "light", theta: 45, phi: 0, logarithmic: false,
+  yaw: 0, pitch: 0, zoom: 1, panX: 0, panY: 0, repeat: 1, mip: -1, smooth: true, full: false, drag: "light", theta: 45, phi: 0, logarithmic: false,
   u: 0.5, v: 0.5, level: 0
 };
 const element = id => document.getElementById(id);
@@ -29,7 +29,8 @@ let perPixelMs = 0, isMoving = false, isWaiting = false, isLost = false;
 function fit() {
   const box = element("frame").getBoundingClientRect();
   const full = Math.min(devicePixelRatio || 1, MOST_SIDE / Math.max(box.width, box.height));
-  const cost = perPixelMs * box.width * box.height * full * full;
+  // A lobe is a mere surface once it is made.
+  const cost = state.full || state.shape === "lobe" ? 0 : perPixelMs * box.width * box.height * full * full;
   const ratio = full * Math.min(1, Math.max(LEAST_SCALE, Math.sqrt((isMoving ? SMOOTH_MS : PATIENT_MS) / Math.max(cost, 1e-6))));
   const [width, height] = [box.width, box.height].map(side => Math.max(1, Math.round(side * ratio)));
   if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
@@ -85,14 +86,15 @@ function changed(name) {
   if (["theta", "phi", "logarithmic", "shape"].includes(name) && state.shape === "lobe") {
     const most = scene.makeLobe(state.theta, state.phi, state.logarithmic);
     element("under").textContent = `Light from ${state.theta}° scattered to all directions: f cos θ, at most ${most.toPrecision(3)} /sr. ` +
-      "Colours are those of f; turn it with Shift.";
+      "Colours are those of f; drag turns it.";
   } else if (name === "shape") {
     element("under").textContent = noteOf();
   }
   if (name === "shape") {
     if (state.shape === "plane") Object.assign(state, {yaw: 0, pitch: 0});
     for (const one of document.querySelectorAll("[data-for]")) one.hidden = (one.dataset.for === "lobe") !== (state.shape === "lobe");
-    if (state.shape === "lobe") Object.assign(state, {yaw: 0.5, pitch: 0.35});
+    if (state.shape === "lobe") Object.assign(state, {yaw: 0.5, pitch: 0.35, drag: "turn"});
+    controls.refresh();
   }
   if (["u", "v", "level"].includes(name)) showValues();
   showLines();
@@ -176,6 +178,7 @@ function buildPanel() {
   controls = new Controls(state, changed);
   const c = controls;
   const isBrdf = scene.kind === "brdf";
+  if (isBrdf) Object.assign(state, {u: 30, v: -30});
   const {manifest, source} = container;
   const lobes = scene.canProbe ? [["lobe", "Lobe"]] : [];
   const ev = value => `${value > 0 ? "+" : ""}${value.toFixed(1)} EV`;
@@ -196,7 +199,6 @@ function buildPanel() {
   const values = isBrdf
     ? [h("div", {class: "fields"}, numberField("u", "light, °", -89, 89, 1), numberField("v", "view, °", -89, 89, 1))]
     : [h("div", {class: "fields"}, numberField("u", "u", -16, 16, "any"), numberField("v", "v", -16, 16, "any"), numberField("level", "mip", 0, 20, "any"))];
-  if (isBrdf) Object.assign(state, {u: 30, v: -30});
   replace(element("panel"),
     c.group("Shape", c.choices("shape", "Shape", [["plane", "Plane"], ["sphere", "Sphere"], ["cube", "Cube"], ...(isBrdf ? lobes : [])]),
       isBrdf && h("div", {"data-for": "lobe", hidden: true}, c.slider("theta", "Angle of the light", 0, 88, 1, value => `${value}°`),
@@ -209,6 +211,7 @@ function buildPanel() {
     c.group("View", c.choices("drag", "Drag", [["light", "Drag: light"], ["turn", "turn"], ["pan", "move"]]),
       c.slider("zoom", "Zoom", -2, 8.6, 0.1, times, logarithm), c.slider("yaw", "Turned", -3.2, 3.2, 0.05, value => `${Math.round(value * 180 / Math.PI)}°`),
       c.slider("pitch", "Tilted", -1.57, 1.57, 0.05, value => `${Math.round(value * 180 / Math.PI)}°`), ...sampling,
+      c.tick("full", "Every pixel, however long it takes"),
       h("p", {class: "actions"}, h("button", {type: "button", id: "reset", onclick: reset}, "Set all back"))),
     c.group("Cost", h("p", {class: "cost", id: "cost"}, "Not measured yet."),
       h("p", {class: "actions"}, h("button", {type: "button", id: "measure", onclick: measureCost}, "Measure a frame"))),
