@@ -10,7 +10,8 @@ set(pages ${CMAKE_BINARY_DIR}/docs)
 
 # ---- Programs, their pages and completion ----
 install(TARGETS patina patinad RUNTIME COMPONENT programs)
-install(TARGETS patina_bake RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/patina COMPONENT programs)
+# Not for users to call: what `patina` becomes.
+install(TARGETS patina_bake patina-view RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/patina COMPONENT programs)
 set(made ${pages}/patina.1 ${pages}/patinad.8 ${pages}/patinad.json.5 ${pages}/patina.bash ${pages}/help.json)
 add_custom_command(OUTPUT ${made}
   COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_SOURCE_DIR}/deploy/docs/make_docs.py --patina $<TARGET_FILE:patina>

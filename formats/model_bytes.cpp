@@ -1,5 +1,7 @@
 #include "formats/model_bytes.h"
 
+#include <algorithm>
+
 namespace patina {
 
 uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads) {
@@ -10,6 +12,12 @@ uint64_t ModelBytes(const std::vector<ManifestPayload>& payloads) {
     }
   }
   return bytes;
+}
+
+double CompressionRatio(const ManifestBrdf& brdf, uint64_t bytes) {
+  constexpr double kBytesOfAColor = 6;
+  return kBytesOfAColor * static_cast<double>(brdf.cells) /
+         std::max(1.0, static_cast<double>(bytes));
 }
 
 }  // namespace patina

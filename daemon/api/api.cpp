@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "daemon/api/access.h"
+#include "daemon/api/answers.h"
 #include "daemon/api/api_json.h"
 #include "daemon/api/api_parts.h"
 #include "daemon/api/container_files.h"
@@ -42,6 +43,7 @@ constexpr ApiRoute kRoutes[] = {
     {"GET", "/v1/assets/{name}/files/{file}", "getAssetFile"},
     {"GET", "/v1/assets/{name}/revisions", "listRevisions"},
     {"GET", "/v1/assets/{name}/revisions/{revision}/files/{file}", "getRevisionFile"},
+    {"GET", "/v1/assets/{name}/revisions/{revision}/shader/{file}", "getRevisionShader"},
     {"POST", "/v1/uploads", "beginUpload"},
     {"POST", "/v1/uploads/{upload}/files/{file}", "writeUpload"},
     {"POST", "/v1/uploads/{upload}/submit", "submitUpload"},
@@ -97,14 +99,15 @@ std::span<const ApiRoute> ApiRoutes() { return kRoutes; }
 
 Api::Handler Api::HandlerOf(size_t route) {
   constexpr Handler kHandlers[] = {
-      &Api::SubmitJob,       &Api::ListJobs,       &Api::GetJob,         &Api::CancelJob,
-      &Api::RetryJob,        &Api::HoldJob,        &Api::ReleaseJob,     &Api::SetJobPriority,
-      &Api::GetJobLog,       &Api::GetJobCurve,    &Api::StreamEvents,   &Api::ListAssets,
-      &Api::GetAsset,        &Api::ListAssetFiles, &Api::GetAssetFile,   &Api::ListRevisions,
-      &Api::GetRevisionFile, &Api::BeginUpload,    &Api::WriteUpload,    &Api::SubmitUpload,
-      &Api::DropUpload,      &Api::IssueTicket,    &Api::GetStatus,      &Api::PauseQueue,
-      &Api::ResumeQueue,     &Api::Rescan,         &Api::GetDescription, &Api::GetHealth,
-      &Api::GetReadiness,    &Api::GetMetrics,     &Api::GetDashboard,   &Api::GetDashboardFile,
+      &Api::SubmitJob,        &Api::ListJobs,          &Api::GetJob,       &Api::CancelJob,
+      &Api::RetryJob,         &Api::HoldJob,           &Api::ReleaseJob,   &Api::SetJobPriority,
+      &Api::GetJobLog,        &Api::GetJobCurve,       &Api::StreamEvents, &Api::ListAssets,
+      &Api::GetAsset,         &Api::ListAssetFiles,    &Api::GetAssetFile, &Api::ListRevisions,
+      &Api::GetRevisionFile,  &Api::GetRevisionShader, &Api::BeginUpload,  &Api::WriteUpload,
+      &Api::SubmitUpload,     &Api::DropUpload,        &Api::IssueTicket,  &Api::GetStatus,
+      &Api::PauseQueue,       &Api::ResumeQueue,       &Api::Rescan,       &Api::GetDescription,
+      &Api::GetHealth,        &Api::GetReadiness,      &Api::GetMetrics,   &Api::GetDashboard,
+      &Api::GetDashboardFile,
   };
   static_assert(std::size(kHandlers) == std::size(kRoutes));
   return kHandlers[route];
@@ -124,9 +127,7 @@ HttpResponse Api::Refuse(int status) {
 HttpResponse Api::Handle(const HttpRequest& request) {
   HttpResponse response = CheckAccess(request);
   if (response.status == 200) response = Route(request);
-  response.headers.emplace_back("X-Content-Type-Options", "nosniff");
-  response.headers.emplace_back("Cache-Control", "no-store");
-  response.headers.emplace_back("Referrer-Policy", "no-referrer");
+  AddProtection(&response);
   ++requests_;
   if (response.status >= 400) ++refused_;
   if (response.status >= 500) {
@@ -398,7 +399,7 @@ HttpResponse Api::GetAssetFile(const Call& call) {
   if (!asset) return ProblemResponse(asset.error());
   if (asset->container.empty())
     return ProblemResponse(404, "not_found", "the asset has no container yet");
-  return SendContainerFile(call.request, asset->container, call.arguments[1]);
+  return ContainerFileAnswer(call.request, asset->container, call.arguments[1]);
 }
 
 // ---- the service -----------------------------------------------------------------------------

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/api/answers.h"
 #include "daemon/api/http_types.h"
 #include "daemon/api/tickets.h"
 #include "daemon/api/uploads.h"
@@ -70,6 +71,7 @@ class Api : public HttpHandler {
   HttpResponse GetAssetFile(const Call& call);
   HttpResponse ListRevisions(const Call& call);
   HttpResponse GetRevisionFile(const Call& call);
+  HttpResponse GetRevisionShader(const Call& call);
   HttpResponse BeginUpload(const Call& call);
   HttpResponse WriteUpload(const Call& call);
   HttpResponse SubmitUpload(const Call& call);
@@ -88,8 +90,6 @@ class Api : public HttpHandler {
 
   // Whether a request carries a ticket that was issued for its path.
   bool AdmitsTicket(const HttpRequest& request);
-  HttpResponse SendContainerFile(const HttpRequest& request, const std::string& container,
-                                 const std::string& name) const;
   HttpResponse AfterChange(int64_t id, const Status& status);
   void WriteEvents(Subscription* events, EventWriter* out) const;
 
@@ -99,6 +99,7 @@ class Api : public HttpHandler {
   Logger* log_;
   std::unique_ptr<Uploads> uploads_;  // null: none are taken
   Tickets tickets_;
+  ShaderPackages shaders_;
   std::atomic<int> event_clients_{0};
   std::atomic<int64_t> requests_{0}, refused_{0};
 };

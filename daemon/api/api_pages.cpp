@@ -1,5 +1,6 @@
 // The handlers of what the dashboard shows: its own files, containers of all revisions, and how a
 // job learns.
+#include "daemon/api/answers.h"
 #include "daemon/api/api_json.h"
 #include "daemon/api/api_parts.h"
 #include "daemon/api/container_files.h"
@@ -8,6 +9,21 @@
 #include "formats/base/names.h"
 
 namespace patina::daemon {
+namespace {
+
+// The folder of one of the revisions that are there: a name is never made into a path.
+Result<std::string> ContainerOf(Service* service, const std::string& name,
+                                const std::string& wanted) {
+  PATINA_ASSIGN(const AssetView asset, service->GetAsset(name));
+  PATINA_ASSIGN(const std::vector<AssetRevision> revisions,
+                RevisionsOf(asset.out + "/" + asset.name));
+  for (const AssetRevision& revision : revisions) {
+    if (revision.name == wanted) return revision.container;
+  }
+  return Fail(ErrorCode::kNotFound, "the asset has no revision " + QuoteForMessage(wanted));
+}
+
+}  // namespace
 
 bool Api::AdmitsTicket(const HttpRequest& request) {
   if (request.query.size() != 1 || request.query[0].first != "ticket") return false;
@@ -20,29 +36,6 @@ HttpResponse Api::IssueTicket(const Call& call) {
   const auto ticket = tickets_.Issue(parsed.path, Tickets::Clock::now());
   if (!ticket) return ProblemResponse(ticket.error());
   return JsonResponse(200, TicketJson("?ticket=" + *ticket, Tickets::kLifetime.count()));
-}
-
-HttpResponse Api::SendContainerFile(const HttpRequest& request, const std::string& container,
-                                    const std::string& name) const {
-  auto file = OpenBelow(container, name);
-  if (!file) return ProblemResponse(file.error());
-  HttpResponse response;
-  const std::string tag = Revised(container + "/" + name + " " + std::to_string(file->mtime_ns) +
-                                  " " + std::to_string(file->bytes));
-  response.headers.emplace_back("ETag", tag);
-  if (NamesTag(request.Header("If-None-Match"), tag)) {
-    response.status = 304;
-    return response;
-  }
-  response.content_type = ContentTypeOf(name);
-  // A report is a page of its own and runs nothing.
-  response.headers.emplace_back("Content-Security-Policy",
-                                "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
-                                "frame-ancestors 'none'; sandbox");
-  if (file->bytes == 0) return response;
-  response.file = std::move(file->fd);
-  response.file_bytes = file->bytes;
-  return response;
 }
 
 HttpResponse Api::ListRevisions(const Call& call) {
@@ -66,17 +59,15 @@ HttpResponse Api::ListRevisions(const Call& call) {
 }
 
 HttpResponse Api::GetRevisionFile(const Call& call) {
-  const auto asset = service_->GetAsset(call.arguments[0]);
-  if (!asset) return ProblemResponse(asset.error());
-  const auto revisions = RevisionsOf(asset->out + "/" + asset->name);
-  if (!revisions) return ProblemResponse(revisions.error());
-  // One of those that are there: a name is never made into a path.
-  for (const AssetRevision& revision : *revisions) {
-    if (revision.name == call.arguments[1])
-      return SendContainerFile(call.request, revision.container, call.arguments[2]);
-  }
-  return ProblemResponse(404, "not_found",
-                         "the asset has no revision " + QuoteForMessage(call.arguments[1]));
+  const auto container = ContainerOf(service_, call.arguments[0], call.arguments[1]);
+  return container ? ContainerFileAnswer(call.request, *container, call.arguments[2])
+                   : ProblemResponse(container.error());
+}
+
+HttpResponse Api::GetRevisionShader(const Call& call) {
+  const auto container = ContainerOf(service_, call.arguments[0], call.arguments[1]);
+  return container ? ShaderFileAnswer(&shaders_, call.request, *container, call.arguments[2])
+                   : ProblemResponse(container.error());
 }
 
 HttpResponse Api::GetJobCurve(const Call& call) {

@@ -61,6 +61,15 @@ export async function blob(path, options) {
   return (await request(path, options)).blob();
 }
 
+export async function bytes(path, options) {
+  return (await request(path, options)).arrayBuffer();
+}
+
+// Of an address that carries it.
+export function keepToken(token) {
+  sessionStorage.setItem(KEPT, token);
+}
+
 export async function post(path, body = {}, options = {}) {
   const response = await request(path, {...options, method: "POST", body: JSON.stringify(body),
     headers: {"Content-Type": "application/json"}});

@@ -5,6 +5,7 @@ import {assetsView, assetView} from "./assets.js";
 import {jobView} from "./job.js";
 import {machineView} from "./machine.js";
 import {queueView} from "./queue.js";
+import {askForToken} from "./token.js";
 
 const VIEWS = {queue: queueView, job: jobView, assets: assetsView, asset: assetView, machine: machineView};
 const main = document.getElementById("main");
@@ -33,31 +34,7 @@ function show(isFirst) {
   current.ready.then(() => performance.mark("patina-shown"));
 }
 
-// ---- the token
-
-onTokenWanted(wasWrong => new Promise(resolve => {
-  const dialog = document.getElementById("ask");
-  const form = dialog.querySelector("form");
-  const input = document.getElementById("token");
-  document.getElementById("ask-wrong").hidden = !wasWrong;
-  const take = event => {
-    event.preventDefault();
-    const token = input.value.trim();
-    // Anything else cannot stand in a header.
-    if (!/^[A-Za-z0-9\-._~+/=]+$/.test(token)) {
-      document.getElementById("ask-wrong").hidden = false;
-      return;
-    }
-    form.removeEventListener("submit", take);
-    input.value = "";
-    dialog.close();
-    resolve(token);
-  };
-  form.addEventListener("submit", take);
-  dialog.addEventListener("cancel", event => event.preventDefault());
-  dialog.showModal();
-  input.focus();
-}));
+onTokenWanted(askForToken);
 
 // ---- files that are dropped anywhere
 

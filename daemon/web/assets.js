@@ -185,6 +185,8 @@ export function assetView(parameters, name) {
     openFile(path).catch(error => replace(trouble, failure(error)));
   };
 
+  const viewerOf = revision => `/web/viewer.html?${new URLSearchParams({asset: name, revision})}`;
+
   function showHead(asset, newest) {
     const cells = [["state", stateMark(asset.state)]];
     if (newest) {
@@ -196,7 +198,8 @@ export function assetView(parameters, name) {
     if (asset.updated) cells.push(["changed", moment(asset.updated)]);
     refresh(head, asset.reason && h("p", {class: "verdict bad"}, asset.reason.split("\n")[0]), facts(cells),
       asset.revision && h("p", {class: "actions"},
-        h("a", {href: "#report", class: "button main", "data-key": "report", onclick: open(`${base}/files/report.html`)}, "Open the report"),
+        h("a", {href: viewerOf(asset.revision), class: "button main", "data-key": "view"}, "View it lit"),
+        h("a", {href: "#report", class: "button", "data-key": "report", onclick: open(`${base}/files/report.html`)}, "Open the report"),
         h("a", {href: "#manifest", "data-key": "manifest", onclick: open(`${base}/files/manifest.json`)}, "manifest.json"),
         asset.job && h("a", {href: `#/job/${asset.job}`, "data-key": "job"}, "The last job")),
       asset.source && h("p", {class: "quiet path"}, `From ${asset.source}`));
@@ -226,9 +229,11 @@ export function assetView(parameters, name) {
     const reports = ["report", ...read.map(one => h("a", {href: "#report", "data-key": `report${one.listed.revision}`,
       onclick: open(`${base}/revisions/${part(one.listed.revision)}/files/report.html`)}, "open",
       h("span", {class: "unseen"}, ` the report of ${one.listed.revision}`)))];
+    const views = ["view", ...read.map(one => h("a", {href: viewerOf(one.listed.revision), "data-key": `view${one.listed.revision}`}, "View",
+      h("span", {class: "unseen"}, ` ${one.listed.revision} lit`)))];
     const words = [["published", ...read.map(one => moment(one.listed.published))],
       ["profile", ...read.map(one => one.manifest.profile || "–")],
-      ["quality setting", ...read.map(one => one.manifest.quality_setting || "–")], reports];
+      ["quality setting", ...read.map(one => one.manifest.quality_setting || "–")], views, reports];
     if (read.length > 1) words.forEach(row => row.push(""));
     const heads = ["", ...read.map(one => one.listed.revision)];
     if (read.length > 1) heads.push("change");

@@ -24,6 +24,8 @@ int UnpackArchiveCommand(const CommandLine& line, const CancelToken& cancel);
 // `remeasure`: what --against asks for, or nullptr where images cannot be read.
 int ValidateCommand(const CommandLine& line, validate::RemeasureFunction remeasure,
                     const CancelToken& cancel);
+// Becomes the program patina-view; returns only if that cannot be started.
+int ViewCommand(const CommandLine& line);
 
 // "patina: error: <message>" on standard error.
 void PrintError(const std::string& message);

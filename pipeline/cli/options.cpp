@@ -25,6 +25,7 @@ constexpr const char* kExamples =
     "  patina bake scene.glb --out baked                every material of a glTF scene\n"
     "  patina bake chrome.binary steel.bsdf --out baked bake measured BRDFs\n"
     "  patina info baked/sample                         what a container holds and how good it is\n"
+    "  patina view baked/sample                         look at it in the browser, lit\n"
     "  patina unpack baked/sample --out maps            the maps back as images\n"
     "  patina compare baked/sample sample               measure a container against its source "
     "again\n"
@@ -573,6 +574,7 @@ void AddClientCommands(CLI::App* app, CommandLine* line) {
 #include "pipeline/cli/options_pack.inl"
 #include "pipeline/cli/options_tradeoff.inl"
 #include "pipeline/cli/options_validate.inl"
+#include "pipeline/cli/options_view.inl"
 
 }  // namespace
 
@@ -599,6 +601,7 @@ ParsedCommandLine ParseCommandLine(int argc, const char* const* argv) {
   AddTradeoff(&app, &line);
   AddPack(&app, &line);
   AddValidate(&app, &line);
+  AddView(&app, &line);
   AddClientCommands(&app, &line);
   std::string topic;
   CLI::App* help = app.add_subcommand("help", "Explain a command");

@@ -107,6 +107,13 @@ struct ShaderCommandOptions {
   int first_binding = 0;
 };
 
+struct ViewArguments {
+  std::string container;
+  std::string source;  // a folder of maps or a job file; empty: none
+  int port = 0;        // 0: any
+  bool no_browser = false;
+};
+
 struct ValidateArguments {
   std::vector<std::string> paths;
   std::string format = "text";          // "text", "json", "junit", "sarif"
@@ -139,6 +146,7 @@ enum class Command {
   kShader,
   kTradeoff,
   kValidate,
+  kView,
   kPack,
   kUnpackArchive,
   // Of a daemon's client.
@@ -163,6 +171,7 @@ struct CommandLine {
   ShaderCommandOptions shader;
   TradeoffOptions tradeoff;
   ValidateArguments validate;
+  ViewArguments view;
   PackArguments pack;
   ClientOptions client;
   bool json = false;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "formats/container.h"
-#include "pipeline/jobs/ingest.h"
 #include "pipeline/jobs/job_sets.h"
 
 namespace patina {
@@ -23,10 +21,8 @@ std::string Cell(const std::optional<double>& value, int digits) {
 
 }  // namespace
 
-Result<Comparison> CompareContainer(const std::string& container, const Job& source,
-                                    ThreadPool& pool, const CancelToken& cancel,
-                                    ProgressSink& progress) {
-  PATINA_ASSIGN(const Container opened, OpenContainer(container));
+Result<JobSource> ReadSourceOf(const Container& opened, const Job& source, ThreadPool& pool,
+                               const CancelToken& cancel, ProgressSink& progress) {
   if (opened.manifest.kind != "material" || source.kind != JobKind::kMaterial) {
     return Fail(ErrorCode::kUnsupported,
                 opened.directory +
@@ -39,7 +35,6 @@ Result<Comparison> CompareContainer(const std::string& container, const Job& sou
                     ": it is not compared with a scene; `patina info` tells how good "
                     "it is");
   }
-  PATINA_TRY(VerifyPayloads(opened));
   Job job = source;
   job.address =
       opened.manifest.source.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
@@ -52,7 +47,7 @@ Result<Comparison> CompareContainer(const std::string& container, const Job& sou
   job.effects.constant_tolerance = 0;
   job.effects.equal = job.effects.unused = false;
   PATINA_ASSIGN(const MapSet set, MapsOfJob(job));
-  PATINA_ASSIGN(const JobSource read, ReadSource(job, set, pool, cancel, progress));
+  PATINA_ASSIGN(JobSource read, ReadSource(job, set, pool, cancel, progress));
   for (const ReferenceMap& map : read.reference.maps) {
     for (const ManifestMap& baked : opened.manifest.maps) {
       if (baked.role != map.role || baked.color_space.empty() ||
@@ -64,17 +59,30 @@ Result<Comparison> CompareContainer(const std::string& container, const Job& sou
                       "\"; give the --color-space and the --ocio of the bake");
     }
   }
+  return read;
+}
+
+bool IsSameSource(const Container& opened, const JobSource& read) {
+  const std::vector<ManifestSourceFile>& files = opened.manifest.source.files;
+  return files.size() == read.sha256.size() &&
+         std::all_of(files.begin(), files.end(), [&](const ManifestSourceFile& file) {
+           return std::find(read.sha256.begin(), read.sha256.end(), file.sha256) !=
+                  read.sha256.end();
+         });
+}
+
+Result<Comparison> CompareContainer(const std::string& container, const Job& source,
+                                    ThreadPool& pool, const CancelToken& cancel,
+                                    ProgressSink& progress) {
+  PATINA_ASSIGN(const Container opened, OpenContainer(container));
+  PATINA_TRY(VerifyPayloads(opened));
+  PATINA_ASSIGN(const JobSource read, ReadSourceOf(opened, source, pool, cancel, progress));
   Comparison comparison;
   comparison.asset = opened.manifest.asset;
   comparison.directory = opened.directory;
   PATINA_ASSIGN(comparison.measurement, MeasureContainer(opened.directory, read.reference.material,
                                                          pool, cancel, progress, {}));
-  const std::vector<ManifestSourceFile>& files = opened.manifest.source.files;
-  comparison.same_source =
-      files.size() == read.sha256.size() &&
-      std::all_of(files.begin(), files.end(), [&](const ManifestSourceFile& file) {
-        return std::find(read.sha256.begin(), read.sha256.end(), file.sha256) != read.sha256.end();
-      });
+  comparison.same_source = IsSameSource(opened, read);
   return comparison;
 }
 

@@ -4,8 +4,10 @@
 #include <string>
 
 #include "formats/base/result.h"
+#include "formats/container.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/base/thread_pool.h"
+#include "pipeline/jobs/ingest.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/measure.h"
 
@@ -18,11 +20,17 @@ struct Comparison {
   bool same_source = false;  // the source's files have the hashes that the manifest lists
 };
 
-// `source` says where the maps are: folder, set or maps of a job; its other fields are not used but
-// for repair_nonfinite, toksvig, normal_convention, color_space and ocio. Addressing and working
-// space are the container's. Errors: kConflict if a colour is not read as it was; those
-// of OpenContainer, VerifyPayloads, MapsOfJob, ReadSource and MeasureContainer; kUnsupported for a
-// BRDF.
+// The maps that a material was baked from, or others to hold it against. `source` says where they
+// are: folder, set or maps of a job; its other fields are not used but for repair_nonfinite,
+// toksvig, normal_convention, color_space and ocio. Addressing, mips and working space are the
+// container's. Errors: kConflict if a colour is not read as it was; those of MapsOfJob and
+// ReadSource; kUnsupported for a BRDF.
+Result<JobSource> ReadSourceOf(const Container& opened, const Job& source, ThreadPool& pool,
+                               const CancelToken& cancel, ProgressSink& progress);
+// Whether their files have the hashes that the manifest lists.
+bool IsSameSource(const Container& opened, const JobSource& read);
+
+// Errors: those of OpenContainer, VerifyPayloads, ReadSourceOf and MeasureContainer.
 Result<Comparison> CompareContainer(const std::string& container, const Job& source,
                                     ThreadPool& pool, const CancelToken& cancel,
                                     ProgressSink& progress);

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/model_bytes.h"
-#include "pipeline/jobs/measure_svbrdf.h"
 #include "pipeline/jobs/package.h"
 
 namespace patina {

@@ -176,12 +176,6 @@ Result<SvbrdfMeasurement> MeasureSvbrdf(const std::string& directory, const svbr
   return result;
 }
 
-double CompressionRatio(const ManifestBrdf& brdf, uint64_t bytes) {
-  constexpr double kBytesOfAColor = 6;
-  return kBytesOfAColor * static_cast<double>(brdf.cells) /
-         std::max(1.0, static_cast<double>(bytes));
-}
-
 SvbrdfSummary SummarizeSvbrdf(const SvbrdfMeasurement& measurement, const ManifestBrdf& brdf,
                               uint64_t bytes) {
   SvbrdfSummary summary;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "formats/base/result.h"
-#include "formats/manifest.h"
+#include "formats/model_bytes.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/brdf/sphere_render.h"
@@ -44,9 +44,6 @@ struct SvbrdfMeasurement {
 Result<SvbrdfMeasurement> MeasureSvbrdf(const std::string& directory, const svbrdf::ImageSet& set,
                                         ThreadPool& pool, const CancelToken& cancel,
                                         ProgressSink& progress);
-
-// Bytes of the images as half floats, over `bytes`.
-double CompressionRatio(const ManifestBrdf& brdf, uint64_t bytes);
 
 SvbrdfSummary SummarizeSvbrdf(const SvbrdfMeasurement& measurement, const ManifestBrdf& brdf,
                               uint64_t bytes);

@@ -196,11 +196,6 @@ Error BadImage(const ImageSet& set, size_t image, ErrorCode code, const std::str
 
 }  // namespace
 
-bool IsImageSetFileName(std::string_view path) {
-  return path.size() > kImageSetSuffix.size() &&
-         path.substr(path.size() - kImageSetSuffix.size()) == kImageSetSuffix;
-}
-
 Result<ImageSet> ReadImageSet(const std::string& path) {
   PATINA_ASSIGN(const std::string text, ReadTextFile(path, kMaxImageSetBytes));
   auto json = ParseStrictJson(text, kDeepestJson);

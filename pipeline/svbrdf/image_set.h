@@ -14,9 +14,11 @@
 
 namespace patina::svbrdf {
 
-// Files of this end are lists of images.
+// Files of this end are lists of images. Inline: who only asks must not load the image library.
 inline constexpr std::string_view kImageSetSuffix = ".btf.json";
-bool IsImageSetFileName(std::string_view path);
+inline bool IsImageSetFileName(std::string_view path) {
+  return path.size() > kImageSetSuffix.size() && path.ends_with(kImageSetSuffix);
+}
 
 inline constexpr size_t kMaxImageSetBytes = size_t{64} << 20;
 inline constexpr size_t kMaxSetImages = 65536;

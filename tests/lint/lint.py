@@ -32,6 +32,7 @@ DAEMON_TIERS = {
     "config": 1, "execute": 1, "queue": 1,
     "service": 2,
     "api": 3, "watch": 3,
+    "view": 4,
 }
 MODULE_TIERS = {"pipeline": PIPELINE_TIERS, "daemon": DAEMON_TIERS}
 # Includes between modules of one tier, as (from, to).

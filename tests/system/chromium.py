@@ -8,6 +8,8 @@ import subprocess
 import time
 
 SKIPPED = 77
+# WebGL without a graphics card, by SwiftShader: slow, exact, and the same everywhere.
+SOFTWARE_GL = ("--use-angle=swiftshader", "--use-gl=angle", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 TIMEOUT_S = 120  # of one answer; a hang is a failure, not a measure of speed
 
 
@@ -19,7 +21,7 @@ def find_chromium():
 class Browser:
     """Chromium, spoken to over a pair of pipes: JSON messages that end in a zero byte."""
 
-    def __init__(self, program, profile):
+    def __init__(self, program, profile, graphics=("--disable-gpu",)):
         from_us, self._out = os.pipe()
         self._in, to_us = os.pipe()
 
@@ -30,7 +32,7 @@ class Browser:
             os.dup2(writer, 4)
 
         self._process = subprocess.Popen(
-            [program, "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-gpu",
+            [program, "--headless", "--no-sandbox", "--disable-quic", "--no-first-run", *graphics,
              "--disable-background-networking", "--disable-component-update", "--disable-sync",
              "--disable-dev-shm-usage", "--user-data-dir=" + profile, "--remote-debugging-pipe", "about:blank"],
             preexec_fn=pipes, pass_fds=(3, 4), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
@@ -94,8 +96,8 @@ class Page:
     def call(self, method, **parameters):
         return self._browser.call(method, self.session, **parameters)
 
-    def look(self, width, scheme):
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 600)
+    def look(self, width, scheme, height=900):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
     def open(self, url):

@@ -19,55 +19,12 @@ import sys
 import tempfile
 import urllib.request
 
-from chromium import SKIPPED, Browser, Page, find_chromium
+from chromium import SKIPPED, SOFTWARE_GL, Browser, Page, find_chromium
+from page_checks import AXE_MISSING, faults_of, has_axe
 
 WIDTHS = (1280, 390)
 SCHEMES = ("light", "dark")
 TOKEN = "dashboard-test-token-0123456789"
-# What a page must not have: [overflow, controls without a name, pictures without one, headings missing, low contrast].
-CHECKS = """(() => {
-  const visible = element => element.getClientRects().length > 0 && getComputedStyle(element).visibility !== 'hidden';
-  const named = element => (element.getAttribute('aria-label') || element.textContent || '').trim() ||
-    (element.labels && element.labels.length > 0) || element.getAttribute('aria-labelledby');
-  const wrong = [];
-  const wide = document.documentElement.scrollWidth - document.documentElement.clientWidth;
-  if (wide > 0) wrong.push(wide + ' pixels wider than the screen');
-  for (const element of document.querySelectorAll('a, button, input, select, summary, canvas, progress, svg[role=img]')) {
-    if (!element.closest('dialog:not([open])') && !named(element)) wrong.push('has no name: ' + element.outerHTML.slice(0, 120));
-  }
-  for (const element of document.querySelectorAll('table')) {
-    if (!element.caption || !element.caption.textContent.trim()) wrong.push('a table without a caption');
-  }
-  const ids = [...document.querySelectorAll('[id]')].map(element => element.id);
-  for (const id of ids.filter((id, i) => ids.indexOf(id) !== i)) wrong.push('an id twice: ' + id);
-  for (const element of document.querySelectorAll('[aria-labelledby]')) {
-    if (!document.getElementById(element.getAttribute('aria-labelledby'))) wrong.push('labelled by nothing: ' + element.tagName);
-  }
-  if (document.querySelectorAll('h1').length !== 1) wrong.push(document.querySelectorAll('h1').length + ' main headings');
-  const levels = [...document.querySelectorAll('main h1, main h2, main h3')].map(heading => Number(heading.tagName[1]));
-  levels.forEach((level, i) => { if (i > 0 && level > levels[i - 1] + 1) wrong.push('a level of headings is left out'); });
-  const numbers = color => color.match(/[0-9.]+/g).map(Number);
-  const light = ([r, g, b]) => [r, g, b].map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
-    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-  const ground = element => {
-    for (let at = element; at; at = at.parentElement) {
-      const color = numbers(getComputedStyle(at).backgroundColor);
-      if (color.length < 4 || color[3] > 0) return color;
-    }
-    return [255, 255, 255];
-  };
-  const seen = new Set();
-  for (const element of document.querySelectorAll('body *')) {
-    const text = [...element.childNodes].some(node => node.nodeType === 3 && node.data.trim());
-    if (!text || !visible(element) || element.closest('.unseen, dialog:not([open]), svg, noscript')) continue;
-    const a = light(numbers(getComputedStyle(element).color)), b = light(ground(element));
-    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-    const what = element.tagName + '.' + element.className;
-    if (contrast < 4.5 && !seen.has(what)) wrong.push('contrast of ' + contrast.toFixed(2) + ': ' + what);
-    if (contrast < 4.5) seen.add(what);
-  }
-  return wrong;
-})()"""
 
 
 class Daemon:
@@ -135,7 +92,7 @@ def use(page, daemon, sample, folder):
                 page.look(width, scheme)
                 page.wait_until(wait, "what is to be seen of " + name)
                 view = f"{name}, {width} pixels, {scheme}"
-                wrong.extend(f"{view}: {text}" for text in page.value(CHECKS))
+                wrong.extend(f"{view}: {text}" for text in faults_of(page))
                 wrong.extend(f"{view}: {text}" for text in page.complaints())
                 page.screenshot(os.path.join(folder, f"{name}-{width}-{scheme}.png"))
                 backgrounds.add(page.value("getComputedStyle(document.body).backgroundColor"))
@@ -197,6 +154,19 @@ def use(page, daemon, sample, folder):
     go(page, "#/machine", "Machine")
     check("machine")
 
+    # The viewer, in the same tab and so with the same token.
+    go(page, "#/asset/" + asset, asset)
+    page.open(page.value("document.querySelector('[data-key=view]').href"))
+    page.wait_until("document.title.endsWith('Patina viewer') && document.querySelector('#status.up')", "the viewer of the current revision")
+    if page.value("[...document.querySelectorAll('#pick-show option')].length") < 4:
+        wrong.append("the viewer of the dashboard shows no maps")
+    check("viewer")
+    page.open(daemon.url + "/web/viewer.html?asset=" + asset + "&revision=r0099")
+    page.wait_until("document.querySelector('#trouble [role=alert]')", "word that there is no such revision")
+    page.complaints()  # the browser reports the answer of 404 by itself
+    page.open(daemon.url + "/")
+    page.wait_until("document.querySelector('#link.up')", "the queue")
+
     # A report opens in a tab of its own, although a link cannot carry the token.
     go(page, "#/asset/" + asset, asset)
     opened = page.value("""(async () => {
@@ -239,6 +209,8 @@ def main():
     if not program:
         print("SKIPPED: no Chromium here (apt install chromium): nobody has looked at the dashboard")
         return SKIPPED
+    if not has_axe():
+        print(AXE_MISSING)
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as scratch:
@@ -246,7 +218,7 @@ def main():
         subprocess.run([patina, "sample", "--out", sample, "--size", "128"], check=True, stdout=subprocess.DEVNULL)
         daemon = Daemon(patinad, patina, scratch)
         try:
-            browser = Browser(program, os.path.join(scratch, "profile"))
+            browser = Browser(program, os.path.join(scratch, "profile"), SOFTWARE_GL)
             try:
                 wrong = use(Page(browser), daemon, sample, folder)
             finally:

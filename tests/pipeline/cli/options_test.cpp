@@ -222,5 +222,20 @@ TEST(BytesText, ChangesItsUnit) {
   EXPECT_EQ(BytesText(2e9), "2.00 GB");
 }
 
+TEST(ParseCommandLine, ReadsEveryOptionOfView) {
+  const ParsedCommandLine parsed =
+      Parse({"view", "baked/wall", "--source", "wall", "--port", "8080", "--no-browser"});
+  ASSERT_TRUE(parsed.command) << parsed.text;
+  EXPECT_EQ(parsed.command->command, Command::kView);
+  EXPECT_EQ(parsed.command->view.container, "baked/wall");
+  EXPECT_EQ(parsed.command->view.source, "wall");
+  EXPECT_EQ(parsed.command->view.port, 8080);
+  EXPECT_TRUE(parsed.command->view.no_browser);
+  EXPECT_EQ(Parse({"view", "a"}).command->view.port, 0);
+  for (const char* port : {"-1", "65536", "http", "80x"})
+    EXPECT_EQ(Parse({"view", "a", "--port", port}).exit_code, 2) << port;
+  EXPECT_EQ(Parse({"view"}).exit_code, 2);
+}
+
 }  // namespace
 }  // namespace patina
