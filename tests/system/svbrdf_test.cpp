@@ -82,8 +82,8 @@ TEST_F(BakedBtf, IsDescribedAndGood) {
 }
 
 TEST_F(BakedBtf, IsValidAndMeasuredTheSameAgain) {
-  const Outcome valid =
-      Patina({"validate", Container(), "--against", In() + "/bumps.btf.json", "--fail-on", "warning"});
+  const Outcome valid = Patina(
+      {"validate", Container(), "--against", In() + "/bumps.btf.json", "--fail-on", "warning"});
   EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
   // A texture that nobody refers to any more, and an image that is another one.
   const std::string copy = *folder_ / "broken";
