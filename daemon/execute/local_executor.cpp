@@ -210,6 +210,9 @@ class LocalExecutor : public Executor {
     paths.read.push_back(spec.fence);
     paths.execute = SystemPrograms();
     paths.execute.push_back(options_.worker);
+    // What the worker becomes; a worker of another kind has none.
+    const std::string folder = options_.worker.substr(0, options_.worker.rfind('/') + 1);
+    paths.execute.push_back(folder + "../libexec/patina");
     paths.list = {spec.out};
     paths.write = {spec.out + "/" + spec.asset, spec.folder, "/dev/null"};
     return Sandbox::Create(paths);
