@@ -26,7 +26,7 @@ int DispatchImages(const CommandLine& line, const CancelToken& cancel, char**) {
     case Command::kCompare:
       return CompareCommand(line, cancel);
     case Command::kSample:
-      return SampleCommand(line);
+      return SampleCommand(line, cancel);
     case Command::kTradeoff:
       return TradeoffCommand(line, cancel);
     case Command::kSubmit:

@@ -16,7 +16,7 @@ int UnpackCommand(const CommandLine& line, const CancelToken& cancel);
 int InfoCommand(const CommandLine& line);
 int CompareCommand(const CommandLine& line, const CancelToken& cancel);
 int EvalCommand(const CommandLine& line);
-int SampleCommand(const CommandLine& line);
+int SampleCommand(const CommandLine& line, const CancelToken& cancel);
 int ShaderCommand(const CommandLine& line);
 int TradeoffCommand(const CommandLine& line, const CancelToken& cancel);
 int PackCommand(const CommandLine& line, const CancelToken& cancel);

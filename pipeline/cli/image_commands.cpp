@@ -71,7 +71,7 @@ int CompareCommand(const CommandLine& line, const CancelToken& cancel) {
   return kExitDone;
 }
 
-int SampleCommand(const CommandLine& line) {
+int SampleCommand(const CommandLine& line, const CancelToken& cancel) {
   const SampleOptions& options = line.sample;
   std::vector<std::string> paths;
   constexpr int kDefaultSize = 1024, kDefaultBtfSize = 64;
@@ -84,7 +84,10 @@ int SampleCommand(const CommandLine& line) {
     }
     ThreadPool pool(line.threads);
     SetImageIoThreads(1);
-    auto written = WriteSampleBtf(options.out, {size, options.images, options.seed}, pool);
+    TerminalProgress progress(stderr, line.verbosity, "bumps");
+    auto written =
+        WriteSampleBtf(options.out, {size, options.images, options.seed}, pool, cancel, progress);
+    progress.OnResult({});
     if (!written) return FailCommand(written.error());
     // Thousands of images need no line each.
     paths = {written->front()};

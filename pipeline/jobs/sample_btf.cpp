@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <mutex>
@@ -121,7 +122,8 @@ std::vector<brdf::Direction> SampleDirections(int count) {
 }
 
 Result<std::vector<std::string>> WriteSampleBtf(const std::string& folder,
-                                                const SampleBtfOptions& options, ThreadPool& pool) {
+                                                const SampleBtfOptions& options, ThreadPool& pool,
+                                                const CancelToken& cancel, ProgressSink& progress) {
   PATINA_TRY(MakeDirectories(folder));
   const int each = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(options.images))));
   const std::vector<brdf::Direction> directions = SampleDirections(each);
@@ -130,7 +132,9 @@ Result<std::vector<std::string>> WriteSampleBtf(const std::string& folder,
   const size_t count = directions.size() * directions.size();
   std::mutex mutex;
   std::optional<Error> error;
-  pool.ParallelFor(static_cast<int>(count), [&](int task, int) {
+  std::atomic<size_t> done{0};
+  pool.ParallelFor(static_cast<int>(count), [&](int task, int worker) {
+    if (cancel.cancelled()) return;
     const size_t light = static_cast<size_t>(task) / directions.size(),
                  view = static_cast<size_t>(task) % directions.size();
     std::vector<float> rgb(3 * side * side);
@@ -143,10 +147,19 @@ Result<std::vector<std::string>> WriteSampleBtf(const std::string& folder,
     }
     const Status written = WriteImage(folder + "/" + ImageName(light, view), WriteFormat::kExrHalf,
                                       options.size, options.size, 3, rgb.data());
-    const std::lock_guard lock(mutex);
-    if (!written && !error) error = written.error();
+    if (!written) {
+      const std::lock_guard lock(mutex);
+      if (!error) error = written.error();
+    }
+    const size_t finished = done.fetch_add(1) + 1;
+    if (worker != 0) return;  // one thread speaks
+    ProgressEvent event;
+    event.stage = "sample";
+    event.fraction = static_cast<double>(finished) / static_cast<double>(count);
+    progress.OnProgress(event);
   });
   if (error) return Fail(std::move(*error));
+  if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
   nlohmann::ordered_json json;
   json["version"] = 1;
   json["width"] = json["height"] = options.size;

@@ -8,6 +8,7 @@
 
 #include "formats/base/result.h"
 #include "formats/brdf/brdf_source.h"
+#include "pipeline/base/progress.h"
 #include "pipeline/base/thread_pool.h"
 
 namespace patina {
@@ -46,9 +47,10 @@ struct SampleBtfOptions {
 std::vector<brdf::Direction> SampleDirections(int count);
 
 // Writes bumps.btf.json and an image (*.exr, half floats) for each pair of directions into
-// `folder`, and returns the paths, the list first. Errors: those of MakeDirectories, WriteImage and
-// WriteFileDurably.
+// `folder`, the list last, and returns the paths, the list first. Errors: those of MakeDirectories,
+// WriteImage and WriteFileDurably; kCancelled.
 Result<std::vector<std::string>> WriteSampleBtf(const std::string& folder,
-                                                const SampleBtfOptions& options, ThreadPool& pool);
+                                                const SampleBtfOptions& options, ThreadPool& pool,
+                                                const CancelToken& cancel, ProgressSink& progress);
 
 }  // namespace patina

@@ -38,12 +38,12 @@ struct SvbrdfOptions {
   int batch = 2048;
   int free_steps = 5000;
   int block_steps = 5000;
-  int final_steps = 1000;  // behind a texture that stays as it is
+  int final_steps = 3000;  // behind a texture that stays as it is
   float feature_rate = 0.01f;
   float network_rate = 0.004f;
   float texel_rate = 0.02f;  // of free texels
-  float block_rate = 0.01f;  // of end points, binades
-  float index_rate = 0.02f;
+  float block_rate = 0.005f;  // of end points, binades
+  float index_rate = 0.01f;
   float decay = 0.02f;
   const CancelToken* cancel = nullptr;
   RateFault rate_fault;  // for tests

@@ -259,8 +259,9 @@ class Runner {
     if (mkdtemp(pattern.data()) == nullptr) Die("cannot make a temporary folder");
     set_folder_ = pattern;
     SetImageIoThreads(1);
-    const auto paths = Must(
-        WriteSampleBtf(set_folder_, {arguments_.size, arguments_.images, arguments_.seed}, pool_));
+    const auto paths =
+        Must(WriteSampleBtf(set_folder_, {arguments_.size, arguments_.images, arguments_.seed},
+                            pool_, CancelToken(), NoProgress()));
     set_ = Must(svbrdf::ReadImageSet(paths[0]));
     shape_ = svbrdf::DefaultSvbrdfShape(set_.width, set_.height, set_.address);
     shape_.texture.textures = arguments_.textures;

@@ -329,8 +329,8 @@ TEST(BakeBrdf, DoesNotLearnAzimuthsThatChangeNothing) {
   ASSERT_EQ(plain["effects"][0]["what"], "azimuth");
   EXPECT_EQ(plain["effects"][0]["state"], "left_out");
   EXPECT_THAT(plain["effects"][0]["reason"].get<std::string>(), HasSubstr("counts as isotropic"));
-  for (const char* saving :
-       {"bytes", "decode_multiply_adds", "train_samples", "train_multiply_adds"})
+  // The samples are as many, of a third of the weights.
+  for (const char* saving : {"bytes", "decode_multiply_adds", "train_multiply_adds"})
     EXPECT_GT(plain["effects"][0]["saved"][saving], 0) << saving;
   const Json sided =
       bake("sided", [](const brdf::Direction& wi, const brdf::Direction& wo, float* rgb) {
