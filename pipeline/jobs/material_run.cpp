@@ -46,7 +46,7 @@ class MaterialRun : public StagedRun {
       PATINA_TRY(Stage("train", [this] { return Train(); }));
       PATINA_TRY(Stage("package", [this] { return Package(); }));
       PATINA_TRY(Stage("verify", [this] { return Verify(); }));
-    } while (TriesNextProfile(result_.psnr->mip0_db, false));
+    } while (TrainsLonger() || TriesNextProfile(result_.psnr->mip0_db, false));
     PATINA_TRY(Stage("report", [this] { return Report(); }));
     PATINA_TRY(
         Stage("publish", [this] { return WhatIsMissed().empty() ? Publish(Curve()) : Reject(); }));
@@ -106,6 +106,7 @@ class MaterialRun : public StagedRun {
     if (material.pyramid.channels == 0) return {};
     if (!choice_) PATINA_TRY(Choose());
     TrainOptions options = OptionsOfJob();
+    options.target_margin_db += more_margin_db_;
     if (job_.target_psnr_db > 0)
       options.target_psnr_db = std::max(1e-3, job_.target_psnr_db - ConstantsGainDb());
     if (job_.time_budget_s > 0)
@@ -187,6 +188,19 @@ class MaterialRun : public StagedRun {
            job_.time_budget_s == 0;
   }
 
+  // Whether the training ended at the target, and the export lost more than was in hand: the same
+  // profile may have more to give. A target that is met at last is worth training twice.
+  bool TrainsLonger() {
+    constexpr double kSafetyDb = 0.05;
+    const double missing = job_.target_psnr_db - result_.psnr->mip0_db;
+    if (result_.stopped_by != "target" || missing <= 0 || job_.time_budget_s > 0) return false;
+    more_margin_db_ += missing + kSafetyDb;
+    observer_.OnNote("chosen",
+                     "the files are " + Decimals(2, missing) + " dB below the target at " +
+                         "which the training ended: it is done again, and goes on longer");
+    return true;
+  }
+
   // Whether another profile is to be tried in place of the one that missed.
   bool TriesNextProfile(double reached_db, bool given_up) {
     if (!MayTryMore() || reached_db >= job_.target_psnr_db ||
@@ -248,6 +262,9 @@ class MaterialRun : public StagedRun {
 
   Status Verify() {
     PATINA_TRY(VerifyPayloads({staging_->directory(), WithPayloads()}));
+    // A model that missed may have been here before.
+    preview_ = Preview();
+    page_pictures_ = PagePictures();
     const LevelViewer viewer = [this](int mip, std::span<const metrics::QualityMap> maps, int width,
                                       int height, std::span<const metrics::PlanePair> planes) {
       if (mip == 0) preview_.Capture(maps, width, height, planes, *pool_);
@@ -324,6 +341,7 @@ class MaterialRun : public StagedRun {
   }
 
   Job chosen_;                            // the job with the profile that was chosen
+  double more_margin_db_ = 0;             // beyond what trainings keep of a target for the export
   std::optional<ManifestChoice> choice_;  // when the job asks for a quality or a size
   JobMaps maps_;
   JobSource source_;

@@ -73,7 +73,7 @@ class Schedule {
   void Observe(double samples, double psnr_mip0_db) {
     if (ending_) return;
     outlook_db_ = psnr_mip0_db + GainToCome(std::clamp(progress_, 1e-3, 1.0));
-    if (options_.target_psnr_db > 0 && psnr_mip0_db >= options_.target_psnr_db + kTargetMarginDb) {
+    if (options_.target_psnr_db > 0 && psnr_mip0_db >= options_.target_psnr_db + options_.target_margin_db) {
       End(samples, "target");
     } else if (options_.quality == Quality::kReference && options_.samples == 0 && last_samples_ > 0) {
       const double doublings = std::log2(samples / last_samples_);
@@ -90,9 +90,8 @@ class Schedule {
   const char* stopped_by() const { return stopped_by_; }
 
  private:
-  // Gain of mip 0 in dB for twice the samples below which more of them do not pay, and what the export may lose of a target.
+  // Gain of mip 0 in dB for twice the samples below which more of them do not pay.
   static constexpr double kFlatDb = 0.03;
-  static constexpr double kTargetMarginDb = 0.1;
   static constexpr double kEndingFrom = 0.8;  // the last fifth of the cosine: where most of the noise settles
 
   void End(double samples, const char* why) {

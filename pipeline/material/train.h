@@ -52,7 +52,8 @@ struct TrainOptions {
   Quality quality = Quality::kStandard;
   uint64_t seed = 1;
   double time_budget_s = 0;     // 0: none. Leaves room to export, verify and report within it; not reproducible to the byte
-  double target_psnr_db = 0;    // 0: none. Stops once the held-out PSNR of mip 0 is there
+  double target_psnr_db = 0;    // 0: none. Stops once the held-out PSNR of mip 0 is there ...
+  double target_margin_db = 0.1;  // ... and so much above: what the export is expected to lose
   bool give_up = false;         // ends without a model (stopped_by "hopeless") once the target is out of reach: see GainToCome
   double samples = 0;           // 0: by quality and size. Otherwise train with exactly this many (rounded up to a step)
   const CancelToken* cancel = nullptr;
