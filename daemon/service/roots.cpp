@@ -81,8 +81,9 @@ std::vector<std::string> InputsOf(const Job& job, const Roots& roots) {
   for (const JobMap& map : job.maps) inputs.push_back(map.file);
   // Its tables lie beside it or below.
   if (!job.ocio.empty()) inputs.push_back(fs::path(job.ocio).parent_path().string());
-  // A scene reads nothing from outside of its folder.
+  // A scene and a set of images read nothing from outside of their folders.
   if (!job.scene.empty()) inputs.push_back(FolderOfFile(job.scene));
+  if (job.kind == JobKind::kSvbrdf) inputs.push_back(FolderOfFile(job.file));
   if (job.folder.empty()) return inputs;
   inputs.push_back(job.folder);
   constexpr int kMostLinks = 1000;

@@ -34,6 +34,12 @@ sigset_t EndingSignals() {
 int Main(int port, bool with_browser, const std::string& source, const std::string& path) {
   auto container = OpenContainer(path);
   if (!container) return FailWith(container.error());
+  const std::string& kind = container->manifest.kind;
+  if (kind != "material" && kind != "brdf") {
+    return FailWith({ErrorCode::kUnsupported, container->directory +
+                                                  ": the viewer does not show kind " + kind +
+                                                  "; its report.html has pictures of it"});
+  }
   // What is damaged is said here, where whoever asked reads it, not only on the page.
   const Status whole = VerifyPayloads(*container);
   if (!whole) return FailWith(whole.error());

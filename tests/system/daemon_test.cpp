@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <nlohmann/json.hpp>
 
 #include "tests/formats/test_support.h"
 #include "tests/system/child_process.h"
@@ -201,6 +202,30 @@ TEST_F(DaemonTest, BakesTheMaterialsOfASceneAndNotItsTextures) {
   }
   std::sort(assets.begin(), assets.end());
   EXPECT_EQ(assets, (std::vector<std::string>{"car_car_chrome", "car_car_paint"})) << Log();
+}
+
+// With images beside the list and below it.
+TEST_F(DaemonTest, BakesASetOfImages) {
+  ASSERT_EQ(Patina({"sample", "--kind", "btf", "--out", folder_ / "bumps", "--size", "8",
+                    "--images", "16"})
+                .exit_code,
+            0);
+  nlohmann::json list = nlohmann::json::parse(ReadAll(folder_ / "bumps/bumps.btf.json"));
+  fs::create_directories(folder_ / "bumps/tilted");
+  const std::string last = list["images"].back()["file"];
+  fs::rename(folder_ / ("bumps/" + last), folder_ / ("bumps/tilted/" + last));
+  list["images"].back()["file"] = "tilted/" + last;
+  std::ofstream(folder_ / "bumps/bumps.btf.json") << list.dump();
+  fs::rename(folder_ / "bumps", folder_ / "drop/bumps");
+  auto daemon = Start();
+  Until(daemon.get(), [&] {
+    return fs::exists(folder_ / "out/bumps/current/manifest.json") ||
+           Log().find("state=failed") != std::string::npos;
+  });
+  Stop(daemon.get());
+  EXPECT_TRUE(fs::exists(folder_ / "out/bumps/current/features_0.dds")) << Log();
+  EXPECT_EQ(Count(Log(), "state=failed"), 0u) << Log();
+  EXPECT_EQ(Patina({"validate", folder_ / "out/bumps"}).exit_code, 0);
 }
 
 // They take half a second and 60 MB, and one of them starts threads that signals would go to.

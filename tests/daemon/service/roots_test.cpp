@@ -89,6 +89,15 @@ TEST(Roots, AScenesFolderIsItsInput) {
   }
 }
 
+TEST(Roots, TheImagesOfASetAreInputsToo) {
+  Job job;
+  job.file = "/in/cloth/cloth.btf.json";
+  job.kind = JobKind::kSvbrdf;
+  EXPECT_EQ(InputsOf(job, {{"/in"}, {}}), (std::vector<std::string>{job.file, "/in/cloth"}));
+  job.kind = JobKind::kBrdf;
+  EXPECT_EQ(InputsOf(job, {{"/in"}, {}}), std::vector<std::string>{job.file});
+}
+
 TEST(Roots, LinksWithinTheRootsAreInputsToo) {
   const patina::test::TemporaryDirectory folder;
   fs::create_directories(folder / "in/wall");
