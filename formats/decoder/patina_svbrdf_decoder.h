@@ -5,11 +5,11 @@
 // needs only the standard library and nlohmann/json: copy them into a renderer. They read what
 // FORMATS.md describes.
 //
-//   using patina::SvbrdfDecoder;
-//   SvbrdfDecoder cloth;
+//   patina::SvbrdfDecoder cloth;
 //   std::string problem;
-//   if (SvbrdfDecoder::Load("out/cloth", &cloth, &problem) != SvbrdfDecoder::LoadStatus::kOk)
-//   return; float rgb[3]; cloth.Evaluate(wi, wo, u, v, s, rgb);
+//   using Status = patina::SvbrdfDecoder::LoadStatus;
+//   if (patina::SvbrdfDecoder::Load("out/cloth", &cloth, &problem) != Status::kOk) return;
+//   cloth.Evaluate(wi, wo, u, v, s, rgb);
 //
 // Directions are unit vectors in the frame of the surface, z along the normal, x along u, y along
 // v, both pointing away from it. A loaded decoder is immutable: all its const members may be called

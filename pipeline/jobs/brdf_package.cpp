@@ -17,6 +17,7 @@
 #include "pipeline/jobs/brdf_job.h"
 #include "pipeline/jobs/load_brdf_decoder.h"
 #include "pipeline/jobs/package.h"
+#include "pipeline/jobs/report.h"
 
 namespace patina {
 namespace {
@@ -140,10 +141,14 @@ Status AddBrdfModel(const brdf::TrainedBrdf& model, const SharedCodebook& shared
     pack.codebook_file = shared.file;
     pack.codebook_sha256 = shared.sha256;
   }
+  return AddGridAndNetwork(pack, model.network, staging);
+}
+
+Status AddGridAndNetwork(const IndexPack& pack, const WeightBuffer& network, StagingArea* staging) {
   auto grid = EncodeIndexPack(pack);
   if (!grid) return AsInternal(Fail(grid.error(), kGridName));
   PATINA_TRY(staging->AddPayload(kGridName, "grid", *grid));
-  auto weights = EncodeWeights(model.network);
+  auto weights = EncodeWeights(network);
   if (!weights) return AsInternal(Fail(weights.error(), kWeightsName));
   return staging->AddPayload(kWeightsName, "weights", *weights);
 }
@@ -165,6 +170,8 @@ Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model) {
 }
 
 void DescribeBrdfModel(const brdf::ModelShape& shape, int texture_inputs, ManifestBrdf* model) {
+  model->grid = kGridName;
+  model->network = kWeightsName;
   model->nside = shape.grid.nside;
   model->primitive_size = shape.primitive_size;
   model->index_bits = shape.index_bits;
@@ -180,15 +187,7 @@ void DescribeBrdfModel(const brdf::ModelShape& shape, int texture_inputs, Manife
 
 Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape,
                       const SharedCodebook& shared) {
-  Manifest manifest;
-  manifest.kind = JobKindName(JobKind::kBrdf);
-  manifest.asset = job.asset;
-  manifest.tool.version = PATINA_VERSION;
-  manifest.tool.recipe = RecipeName(job.recipe);
-  manifest.tool.recipe_version = kBrdfRecipeVersion;
-  manifest.fingerprint = source.fingerprint;
-  manifest.seed = job.seed;
-  manifest.quality_setting = QualityName(job.quality);
+  Manifest manifest = BeginManifest(job, JobKind::kBrdf, kBrdfRecipeVersion, source.fingerprint);
   manifest.warnings = source.data.warnings;
   ManifestBrdf model;
   model.source_format = source.data.format;
@@ -200,10 +199,8 @@ Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::Mode
   model.cells = source.data.cells;
   model.invalid_cells = source.data.invalid_cells;
   model.files.push_back({ManifestPath(FileName(job.file)), source.sha256});
-  model.grid = kGridName;
   model.shared_codebook_file = shared.file;
   model.shared_codebook_sha256 = shared.sha256;
-  model.network = kWeightsName;
   DescribeBrdfModel(shape, 0, &model);
   manifest.brdf = std::move(model);
   manifest.effects = DescribeBrdfEffects(job, source, shape);
@@ -224,17 +221,30 @@ void DescribeBrdfQuality(const BrdfMeasurement& measurement, ManifestBrdf* model
   model->quality = std::move(quality);
 }
 
+Json BeginBrdfReport(const Manifest& manifest) {
+  return {{"version", 1},
+          {"kind", manifest.kind},
+          {"asset", manifest.asset},
+          {"fingerprint", manifest.fingerprint},
+          {"quality_setting", manifest.quality_setting},
+          {"recipe", manifest.tool.recipe}};
+}
+
+std::vector<RunCurvePoint> CurveOf(const std::vector<brdf::CurvePoint>& points) {
+  std::vector<RunCurvePoint> curve;
+  for (const brdf::CurvePoint& point : points) {
+    curve.push_back({point.samples,
+                     point.wall_s,
+                     {{"cpu_seconds", point.cpu_s}, {"log1p_mae", point.log1p_mae}}});
+  }
+  return curve;
+}
+
 std::string BrdfReportToJson(const Manifest& manifest, const std::vector<ManifestPayload>& payloads,
                              const BrdfSource& source, const BrdfMeasurement& measurement,
                              const brdf::TrainedBrdf& model) {
   const ManifestBrdf& described = *manifest.brdf;
-  Json json;
-  json["version"] = 1;
-  json["kind"] = manifest.kind;
-  json["asset"] = manifest.asset;
-  json["fingerprint"] = manifest.fingerprint;
-  json["quality_setting"] = manifest.quality_setting;
-  json["recipe"] = manifest.tool.recipe;
+  Json json = BeginBrdfReport(manifest);
   json["source"] = {
       {"format", described.source_format},
       {"file", described.files[0].path},
@@ -260,10 +270,7 @@ std::string BrdfReportToJson(const Manifest& manifest, const std::vector<Manifes
       {"log1p_mae_before_codebook", model.free_loss},
       {"log1p_mae", model.final_loss},
       {"rollbacks", model.rollbacks}};
-  json["bytes"] = Json::object();
-  for (const ManifestPayload& payload : payloads) json["bytes"][payload.name] = payload.bytes;
-  json["warnings"] = manifest.warnings;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return EndReport(std::move(json), manifest, payloads);
 }
 
 }  // namespace patina

@@ -9,23 +9,28 @@
 #include "formats/base/result.h"
 #include "formats/brdf/brdf_source.h"
 #include "formats/container.h"
+#include "formats/index_pack.h"
 #include "formats/manifest.h"
+#include "formats/weights.h"
 #include "pipeline/brdf/train_brdf.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/jobs/measure_brdf.h"
+#include "pipeline/jobs/run_record.h"
 
 namespace patina {
 
 // A BRDF file in memory, and the fingerprint of what is made from it.
 struct BrdfSource {
-  brdf::Source data;  // its warnings name no folder; isotropic where it is, whatever the format allows
+  brdf::Source
+      data;  // its warnings name no folder; isotropic where it is, whatever the format allows
   // What MeasureAnisotropy says of a table whose format allows for azimuths; else absent.
   std::optional<double> anisotropy;
   std::string sha256;
   std::string fingerprint;  // see BrdfFingerprint
 };
 
-// Errors: those of OpenBrdf and of layered::OpenSimulated; kConflict when the file changed while it was read.
+// Errors: those of OpenBrdf and of layered::OpenSimulated; kConflict when the file changed while it
+// was read.
 Result<BrdfSource> ReadBrdfSource(const Job& job);
 
 // Where the codebook of a model lies if it is shared; both empty if it is not.
@@ -49,16 +54,23 @@ Result<SharedCodebook> WriteSharedCodebook(const brdf::TrainedBrdf& model,
 Status AddBrdfModel(const brdf::TrainedBrdf& model, const SharedCodebook& shared,
                     StagingArea* staging);
 
+// The same of a grid and a network as they are.
+Status AddGridAndNetwork(const IndexPack& pack, const WeightBuffer& network, StagingArea* staging);
+
 // Fits sampler.bin to what the staged files decode to, adds it and names it in the manifest, which
 // must stand beside the payloads already. Errors: those of the decoder, EncodeBrdfSampler and
 // AddPayload.
 Status AddBrdfSampler(StagingArea* staging, ManifestBrdf* model);
 
-// Shape of grid and network; texture_inputs: of a neural texture behind them.
+// Payloads and shape of grid and network; texture_inputs: of a neural texture behind them.
 void DescribeBrdfModel(const brdf::ModelShape& shape, int texture_inputs, ManifestBrdf* model);
 
-// The same as in report.json.
+// The same as in report.json, and what that begins with.
 nlohmann::ordered_json BrdfModelJson(const ManifestBrdf& model);
+nlohmann::ordered_json BeginBrdfReport(const Manifest& manifest);
+
+// The accuracy along the training as run records have it.
+std::vector<RunCurvePoint> CurveOf(const std::vector<brdf::CurvePoint>& points);
 
 // The manifest of a container, without its quality.
 Manifest DescribeBrdf(const Job& job, const BrdfSource& source, const brdf::ModelShape& shape,

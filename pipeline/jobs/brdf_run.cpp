@@ -39,7 +39,7 @@ class BrdfRun : public StagedRun {
     PATINA_TRY(Stage("package", [this] { return Package(); }));
     PATINA_TRY(Stage("verify", [this] { return Verify(); }));
     PATINA_TRY(Stage("report", [this] { return Report(); }));
-    return Stage("publish", [this] { return StagedRun::Publish(Curve()); });
+    return Stage("publish", [this] { return StagedRun::Publish(CurveOf(model_.curve)); });
   }
 
   Status Ingest() {
@@ -104,11 +104,7 @@ class BrdfRun : public StagedRun {
     result_.samples = model_.samples;
     recording_seconds_ = model_.recording_s;
     result_.stopped_by = "budget";
-    if (model_.rollbacks > 0) {
-      sink_.OnWarning("the training ran into values that are not finite and was set back " +
-                      std::to_string(model_.rollbacks) +
-                      " times, with lower rates; look at the preview");
-    }
+    WarnOfRollbacks(model_.rollbacks);
     return {};
   }
 
@@ -156,14 +152,15 @@ class BrdfRun : public StagedRun {
     PATINA_TRY(AddPreview(Sheet()));
     PATINA_TRY(staging_->AddPayload("report.json", "report", AsBytes(report)));
     PATINA_TRY(staging_->WriteManifest(manifest_));
-    return AddReportPage(Curve(), [this](const PageFacts& facts) -> Result<std::string> {
-      PageTrio sphere;
-      sphere.map = "sphere";
-      PATINA_TRY(EncodeTrio({measurement_.source_picture, measurement_.decoded_picture,
-                             measurement_.difference_picture},
-                            false, staging_->directory() + "/page.tmp", &sphere));
-      return BrdfReportPage(facts, source_, measurement_, model_, sphere);
-    });
+    return AddReportPage(
+        CurveOf(model_.curve), [this](const PageFacts& facts) -> Result<std::string> {
+          PageTrio sphere;
+          sphere.map = "sphere";
+          PATINA_TRY(EncodeTrio({measurement_.source_picture, measurement_.decoded_picture,
+                                 measurement_.difference_picture},
+                                false, staging_->directory() + "/page.tmp", &sphere));
+          return BrdfReportPage(facts, source_, measurement_, model_, sphere);
+        });
   }
 
   RgbImage Sheet() const {
@@ -181,15 +178,6 @@ class BrdfRun : public StagedRun {
     row.pictures = {&measurement_.decoded_picture};
     const std::string heads[] = {"decoded", "", ""};  // columns that leave room for the text
     return ComposeSheet(job_.asset, heads, std::span(&row, 1));
-  }
-
-  std::vector<RunCurvePoint> Curve() const {
-    std::vector<RunCurvePoint> curve;
-    for (const brdf::CurvePoint& point : model_.curve)
-      curve.push_back({point.samples,
-                       point.wall_s,
-                       {{"cpu_seconds", point.cpu_s}, {"log1p_mae", point.log1p_mae}}});
-    return curve;
   }
 
   TrainedInGroup* trained_;

@@ -26,8 +26,8 @@ Result<JobSource> ReadSourceOf(const Container& opened, const Job& source, Threa
   if (opened.manifest.kind != "material" || source.kind != JobKind::kMaterial) {
     return Fail(ErrorCode::kUnsupported,
                 opened.directory +
-                    ": only materials are compared with maps; `patina info` tells "
-                    "how good a BRDF is, and `patina eval` gives its values");
+                    ": only materials are compared with maps; `patina info` tells how good a BRDF "
+                    "is, and `patina validate --against SOURCE` measures it again");
   }
   if (!source.scene.empty()) {
     return Fail(ErrorCode::kUnsupported,

@@ -123,11 +123,7 @@ class MaterialRun : public StagedRun {
     result_.samples = model.samples;
     result_.stopped_by = model.stopped_by;
     recording_seconds_ = model.recording_s;
-    if (model.rollbacks > 0) {
-      sink_.OnWarning("the training ran into values that are not finite and was set back " +
-                      std::to_string(model.rollbacks) +
-                      " times, with lower rates; look at the preview");
-    }
+    WarnOfRollbacks(model.rollbacks);
     model_.emplace(std::move(model));
     return {};
   }

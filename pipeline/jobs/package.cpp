@@ -64,10 +64,9 @@ void DescribeModel(const TrainedMaterial& model, const MaterialReference& refere
   manifest->training.float_psnr_mean_mips_db = CapPsnr(model.float_psnr_mean_mips_db);
   manifest->training.rollbacks = model.rollbacks;
   for (const CurvePoint& point : model.curve) {
-    manifest->training.curve.push_back({static_cast<uint64_t>(point.samples),
-                                        CapPsnr(point.psnr_mip0_db),
-                                        CapPsnr(point.psnr_mean_mips_db),
-                                        MapsOfPoint(reference, point)});
+    manifest->training.curve.push_back(
+        {static_cast<uint64_t>(point.samples), CapPsnr(point.psnr_mip0_db),
+         CapPsnr(point.psnr_mean_mips_db), MapsOfPoint(reference, point)});
   }
 }
 
@@ -114,16 +113,23 @@ Status AddModel(const TrainedMaterial& model, StagingArea* staging) {
   return staging->AddPayload(kWeightsName, "weights", *bytes);
 }
 
-Manifest DescribeContainer(const Job& job, const JobSource& source, const TrainedMaterial* model) {
+Manifest BeginManifest(const Job& job, JobKind kind, int recipe_version,
+                       const std::string& fingerprint) {
   Manifest manifest;
+  manifest.kind = JobKindName(kind);
   manifest.asset = job.asset;
   manifest.tool.version = PATINA_VERSION;
   manifest.tool.recipe = RecipeName(job.recipe);
-  manifest.tool.recipe_version = kRecipeVersion;
-  manifest.fingerprint = source.fingerprint;
+  manifest.tool.recipe_version = recipe_version;
+  manifest.fingerprint = fingerprint;
   manifest.seed = job.seed;
-  manifest.profile = ProfileName(job.profile);
   manifest.quality_setting = QualityName(job.quality);
+  return manifest;
+}
+
+Manifest DescribeContainer(const Job& job, const JobSource& source, const TrainedMaterial* model) {
+  Manifest manifest = BeginManifest(job, JobKind::kMaterial, kRecipeVersion, source.fingerprint);
+  manifest.profile = ProfileName(job.profile);
   manifest.source = DescribeSource(source);
   manifest.training.stopped_by = "none";
   if (model != nullptr) DescribeModel(*model, source.reference.material, &manifest);

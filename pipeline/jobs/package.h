@@ -18,6 +18,10 @@ namespace patina {
 // writable.
 Status AddModel(const TrainedMaterial& model, StagingArea* staging);
 
+// What manifests of every kind begin with: kind, asset, tool, fingerprint, seed, quality setting.
+Manifest BeginManifest(const Job& job, JobKind kind, int recipe_version,
+                       const std::string& fingerprint);
+
 // The manifest of a container, without its quality. model: null when every channel is constant.
 // Files whose names cannot stand in a manifest appear under similar ones.
 Manifest DescribeContainer(const Job& job, const JobSource& source, const TrainedMaterial* model);

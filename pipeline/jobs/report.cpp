@@ -94,6 +94,11 @@ std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPay
   json["effects"] = EffectsToJson(manifest.effects);
   json["quality"] = QualityJson(measurement);
   if (model != nullptr) json["training"] = TrainingJson(*model);
+  return EndReport(std::move(json), manifest, payloads);
+}
+
+std::string EndReport(Json json, const Manifest& manifest,
+                      const std::vector<ManifestPayload>& payloads) {
   json["bytes"] = Json::object();
   for (const ManifestPayload& payload : payloads) json["bytes"][payload.name] = payload.bytes;
   json["warnings"] = manifest.warnings;

@@ -2,6 +2,7 @@
 // look closer than the manifest. Deterministic: no times, no paths of the machine.
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -20,5 +21,9 @@ namespace patina {
 std::string ReportToJson(const Manifest& manifest, const std::vector<ManifestPayload>& payloads,
                          const JobSource& source, const Measurement& measurement,
                          const TrainedMaterial* model);
+
+// What reports of every kind end with (bytes of the payloads, warnings), and their text.
+std::string EndReport(nlohmann::ordered_json json, const Manifest& manifest,
+                      const std::vector<ManifestPayload>& payloads);
 
 }  // namespace patina

@@ -184,6 +184,12 @@ Manifest StagedRun::WithPayloads() const {
   return manifest;
 }
 
+void StagedRun::WarnOfRollbacks(int rollbacks) {
+  if (rollbacks == 0) return;
+  sink_.OnWarning("the training ran into values that are not finite and was set back " +
+                  std::to_string(rollbacks) + " times, with lower rates; look at the preview");
+}
+
 double StagedRun::SecondsSoFar() const { return Since(start_); }
 
 }  // namespace patina

@@ -76,6 +76,8 @@ class StagedRun {
   Status AddRunRecord(std::vector<RunCurvePoint> curve);
   // AddRunRecord and the container's publication.
   Status Publish(std::vector<RunCurvePoint> curve);
+  // If the trainer was set back because of values that are not finite.
+  void WarnOfRollbacks(int rollbacks);
   // The manifest with what is staged so far.
   Manifest WithPayloads() const;
   double SecondsSoFar() const;

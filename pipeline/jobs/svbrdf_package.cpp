@@ -7,11 +7,10 @@
 
 #include "formats/base/sha256.h"
 #include "formats/dds.h"
-#include "formats/index_pack.h"
 #include "formats/model_bytes.h"
-#include "formats/weights.h"
 #include "pipeline/jobs/brdf_package.h"
 #include "pipeline/jobs/package.h"
+#include "pipeline/jobs/report.h"
 #include "pipeline/jobs/svbrdf_job.h"
 #include "pipeline/material/trainer.h"
 
@@ -20,8 +19,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kGridName = "grid.hpx";
-constexpr const char* kWeightsName = "decoder.weights";
 constexpr const char* kSourceFormat = "image_set";
 
 std::string FeatureName(int texture) { return "features_" + std::to_string(texture) + ".dds"; }
@@ -78,25 +75,13 @@ Status AddSvbrdfModel(const svbrdf::TrainedSvbrdf& model, StagingArea* staging) 
     if (!bytes) return AsInternal(Fail(bytes.error(), FeatureName(t)));
     PATINA_TRY(staging->AddPayload(FeatureName(t), "features", *bytes));
   }
-  auto grid = EncodeIndexPack(model.pack);
-  if (!grid) return AsInternal(Fail(grid.error(), kGridName));
-  PATINA_TRY(staging->AddPayload(kGridName, "grid", *grid));
-  auto weights = EncodeWeights(model.network);
-  if (!weights) return AsInternal(Fail(weights.error(), kWeightsName));
-  return staging->AddPayload(kWeightsName, "weights", *weights);
+  return AddGridAndNetwork(model.pack, model.network, staging);
 }
 
 Manifest DescribeSvbrdf(const Job& job, const SvbrdfSource& source,
                         const svbrdf::SvbrdfShape& shape) {
-  Manifest manifest;
-  manifest.kind = JobKindName(JobKind::kSvbrdf);
-  manifest.asset = job.asset;
-  manifest.tool.version = PATINA_VERSION;
-  manifest.tool.recipe = RecipeName(job.recipe);
-  manifest.tool.recipe_version = kSvbrdfRecipeVersion;
-  manifest.fingerprint = source.fingerprint;
-  manifest.seed = job.seed;
-  manifest.quality_setting = QualityName(job.quality);
+  Manifest manifest =
+      BeginManifest(job, JobKind::kSvbrdf, kSvbrdfRecipeVersion, source.fingerprint);
   const svbrdf::TextureShape& texture = shape.texture;
   for (int t = 0; t < texture.textures; ++t) {
     ManifestFeature feature;
@@ -114,8 +99,6 @@ Manifest DescribeSvbrdf(const Job& job, const SvbrdfSource& source,
                                   AddressModeName(texture.address), source.images_sha256};
   model.files.push_back(
       {ManifestPath(std::filesystem::path(job.file).filename().string()), source.sha256});
-  model.grid = kGridName;
-  model.network = kWeightsName;
   DescribeBrdfModel(shape.model, texture.features(), &model);
   manifest.brdf = std::move(model);
   return manifest;
@@ -135,13 +118,7 @@ std::string SvbrdfReportToJson(const Manifest& manifest,
                                const SvbrdfSource& source, const SvbrdfMeasurement& measurement,
                                const svbrdf::TrainedSvbrdf& model) {
   const ManifestBrdf& described = *manifest.brdf;
-  Json json;
-  json["version"] = 1;
-  json["kind"] = manifest.kind;
-  json["asset"] = manifest.asset;
-  json["fingerprint"] = manifest.fingerprint;
-  json["quality_setting"] = manifest.quality_setting;
-  json["recipe"] = manifest.tool.recipe;
+  Json json = BeginBrdfReport(manifest);
   json["source"] = {{"format", described.source_format},
                     {"file", described.files[0].path},
                     {"images", described.images->images},
@@ -167,10 +144,7 @@ std::string SvbrdfReportToJson(const Manifest& manifest,
       {"samples", model.samples},          {"codes_in_use", model.used_codes},
       {"log1p_mae_free", model.free_loss}, {"log1p_mae_before_legal_blocks", model.block_loss},
       {"log1p_mae", model.final_loss},     {"rollbacks", model.rollbacks}};
-  json["bytes"] = Json::object();
-  for (const ManifestPayload& payload : payloads) json["bytes"][payload.name] = payload.bytes;
-  json["warnings"] = manifest.warnings;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return EndReport(std::move(json), manifest, payloads);
 }
 
 }  // namespace patina

@@ -7,6 +7,7 @@
 #include "formats/base/file_io.h"
 #include "formats/model_bytes.h"
 #include "pipeline/image/image_io.h"
+#include "pipeline/jobs/brdf_package.h"
 #include "pipeline/jobs/package.h"
 #include "pipeline/jobs/page_pictures.h"
 #include "pipeline/jobs/report_page.h"
@@ -29,7 +30,7 @@ class SvbrdfRun : public StagedRun {
     PATINA_TRY(Stage("package", [this] { return Package(); }));
     PATINA_TRY(Stage("verify", [this] { return Verify(); }));
     PATINA_TRY(Stage("report", [this] { return Report(); }));
-    return Stage("publish", [this] { return StagedRun::Publish(Curve()); });
+    return Stage("publish", [this] { return StagedRun::Publish(CurveOf(model_.curve)); });
   }
 
   Status Ingest() {
@@ -49,9 +50,9 @@ class SvbrdfRun : public StagedRun {
     if (unchanged_) return {};
     PATINA_TRY(OpenStaging());
     shape_ = SvbrdfModelOfJob(job_, set.width, set.height, set.address);
-    options_ = SvbrdfTrainingOfJob(job_, uint64_t{set.images.size()} *
-                                             static_cast<uint64_t>(set.width) *
-                                             static_cast<uint64_t>(set.height));
+    options_ =
+        SvbrdfTrainingOfJob(job_, uint64_t{set.images.size()} * static_cast<uint64_t>(set.width) *
+                                      static_cast<uint64_t>(set.height));
     options_.cancel = &cancel_;
     svbrdf::TexelPoolOptions drawing;
     drawing.count = WantedSamples(options_, shape_.texture, set.images.size());
@@ -90,11 +91,7 @@ class SvbrdfRun : public StagedRun {
     result_.samples = model_.samples;
     recording_seconds_ = model_.recording_s;
     result_.stopped_by = "budget";
-    if (model_.rollbacks > 0) {
-      sink_.OnWarning("the training ran into values that are not finite and was set back " +
-                      std::to_string(model_.rollbacks) +
-                      " times, with lower rates; look at the preview");
-    }
+    WarnOfRollbacks(model_.rollbacks);
     return {};
   }
 
@@ -122,18 +119,19 @@ class SvbrdfRun : public StagedRun {
     PATINA_TRY(AddPreview(Sheet()));
     PATINA_TRY(staging_->AddPayload("report.json", "report", AsBytes(report)));
     PATINA_TRY(staging_->WriteManifest(manifest_));
-    return AddReportPage(Curve(), [this](const PageFacts& facts) -> Result<std::string> {
-      std::vector<PageTrio> planes;
-      for (const SvbrdfPlane& plane : measurement_.planes) {
-        PageTrio trio;
-        trio.map = "plane";
-        PATINA_TRY(
-            EncodeTrio({plane.source_picture, plane.decoded_picture, plane.difference_picture},
-                       false, staging_->directory() + "/page.tmp", &trio));
-        planes.push_back(std::move(trio));
-      }
-      return SvbrdfReportPage(facts, measurement_, model_, planes);
-    });
+    return AddReportPage(
+        CurveOf(model_.curve), [this](const PageFacts& facts) -> Result<std::string> {
+          std::vector<PageTrio> planes;
+          for (const SvbrdfPlane& plane : measurement_.planes) {
+            PageTrio trio;
+            trio.map = "plane";
+            PATINA_TRY(
+                EncodeTrio({plane.source_picture, plane.decoded_picture, plane.difference_picture},
+                           false, staging_->directory() + "/page.tmp", &trio));
+            planes.push_back(std::move(trio));
+          }
+          return SvbrdfReportPage(facts, measurement_, model_, planes);
+        });
   }
 
   RgbImage Sheet() const {
@@ -147,15 +145,6 @@ class SvbrdfRun : public StagedRun {
     }
     const std::string heads[] = {"source", "decoded", "difference x8"};
     return ComposeSheet(job_.asset, heads, rows);
-  }
-
-  std::vector<RunCurvePoint> Curve() const {
-    std::vector<RunCurvePoint> curve;
-    for (const brdf::CurvePoint& point : model_.curve)
-      curve.push_back({point.samples,
-                       point.wall_s,
-                       {{"cpu_seconds", point.cpu_s}, {"log1p_mae", point.log1p_mae}}});
-    return curve;
   }
 
   bool unchanged_ = false;

@@ -61,6 +61,15 @@ Job SourceFor(const Job& source, const Manifest& manifest) {
   return job;
 }
 
+void CompareErrors(const ManifestBrdfQuality& was, const ManifestBrdfQuality& is,
+                   const std::string& file, FindingList* findings) {
+  CompareError("/quality/image_mae", was.image_mae, is.image_mae, file, findings);
+  CompareError("/quality/image_rmse", was.image_rmse, is.image_rmse, file, findings);
+  CompareError("/quality/log1p_mse", was.log1p_mse, is.log1p_mse, file, findings);
+  CompareError("/quality/reciprocity_error", was.reciprocity_error, is.reciprocity_error, file,
+               findings);
+}
+
 void RemeasureBrdf(const Container& container, const Job& job, ThreadPool& pool,
                    const CancelToken& cancel, ProgressSink& progress, const std::string& file,
                    FindingList* findings) {
@@ -77,13 +86,7 @@ void RemeasureBrdf(const Container& container, const Job& job, ThreadPool& pool,
   if (!measured) return refuse(measured.error());
   ManifestBrdf again;
   DescribeBrdfQuality(*measured, &again);
-  const ManifestBrdfQuality& was = model.quality;
-  const ManifestBrdfQuality& is = again.quality;
-  CompareError("/quality/image_mae", was.image_mae, is.image_mae, file, findings);
-  CompareError("/quality/image_rmse", was.image_rmse, is.image_rmse, file, findings);
-  CompareError("/quality/log1p_mse", was.log1p_mse, is.log1p_mse, file, findings);
-  CompareError("/quality/reciprocity_error", was.reciprocity_error, is.reciprocity_error, file,
-               findings);
+  CompareErrors(model.quality, again.quality, file, findings);
 }
 
 void RemeasureSvbrdf(const Container& container, const Job& job, ThreadPool& pool,
@@ -101,11 +104,7 @@ void RemeasureSvbrdf(const Container& container, const Job& job, ThreadPool& poo
   if (!measured) return refuse(measured.error());
   ManifestBrdf again;
   DescribeSvbrdfQuality(*measured, &again);
-  const ManifestBrdfQuality& was = model.quality;
-  const ManifestBrdfQuality& is = again.quality;
-  CompareError("/quality/image_mae", was.image_mae, is.image_mae, file, findings);
-  CompareError("/quality/image_rmse", was.image_rmse, is.image_rmse, file, findings);
-  CompareError("/quality/log1p_mse", was.log1p_mse, is.log1p_mse, file, findings);
+  CompareErrors(model.quality, again.quality, file, findings);
 }
 
 }  // namespace

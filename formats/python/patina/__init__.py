@@ -90,7 +90,10 @@ class Container:
         with open(os.path.join(path, "manifest.json"), encoding="utf-8") as file:
             self.manifest = json.load(file)
         self.kind = self.manifest.get("kind", "material")
-        self._decoder = _native.Brdf(path) if self.kind == "brdf" else _native.Material(path)
+        decoders = {"material": _native.Material, "brdf": _native.Brdf}
+        if self.kind not in decoders:
+            raise ValueError(f"{path}: kind {self.kind} is not decoded here yet; formats/FORMATS.md names the header that does")
+        self._decoder = decoders[self.kind](path)
 
     def __repr__(self):
         return f"<patina.Container {self.kind} {self.asset!r}>"
