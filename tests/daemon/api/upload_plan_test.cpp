@@ -103,6 +103,18 @@ TEST_F(UploadPlan, LeavesTheTexturesOfScenesToThem) {
   EXPECT_EQ(jobs[1].set, "textures_loose");
 }
 
+TEST_F(UploadPlan, TakesTheImagesBesideAListForIts) {
+  Write("cloth/linen.btf.json", "{}");  // what is wrong with it its run says
+  WriteSet("cloth/", "linen");
+  WriteSet("wall/", "wall");
+  const std::vector<Job> jobs = Plan();
+  ASSERT_EQ(jobs.size(), 2u);
+  EXPECT_EQ(jobs[0].kind, JobKind::kSvbrdf);
+  EXPECT_EQ(jobs[0].file, folder_ / "sent/cloth/linen.btf.json");
+  EXPECT_EQ(jobs[0].asset, "linen");
+  EXPECT_EQ(jobs[1].asset, "wall");
+}
+
 TEST_F(UploadPlan, LetsTheRunSayWhatIsWrongWithAScene) {
   Write("hall.gltf", "{");
   const std::vector<Job> jobs = Plan();
