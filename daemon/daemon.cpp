@@ -118,7 +118,8 @@ class Daemon {
       log_.Info("dashboard",
                 {{"url", "http://" +
                              (v6 ? "[" + config_.api.listen_host + "]" : config_.api.listen_host) +
-                             ":" + std::to_string(api_->tcp_port()) + "/"}});
+                             ":" + std::to_string(api_->tcp_port()) + "/"},
+                 {"token_file", config_.api.token_file}});
     }
     NotifyServiceManager("READY=1");
     Follow();

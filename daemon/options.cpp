@@ -24,9 +24,9 @@ usage: patinad --watch DIR --out DIR [OPTION...]
       --failed DIR       Folder for ASSET.failed.json (default: beside the asset)
       --socket PATH      Unix socket of the API (default: patinad.sock in the state folder)
       --listen ADDR:PORT
-                          Also serve the API, and a dashboard for browsers, on a loopback address;
-                          needs --token-file
+                          Also serve the API, and a dashboard for browsers, on a loopback address
       --token-file FILE  The bearer token of TCP clients, in a file of mode 0600
+                          (default: token in the state folder, made at the first start)
       --worker FILE      The patina program (default: the one beside patinad)
       --cores N          Cores that all jobs together may use (default: all)
       --log-level LEVEL  debug, info (default), warning, error
@@ -45,7 +45,7 @@ Exit codes: 0 stopped or all is well, 1 failed, 2 wrong usage, 3 wrong configura
 
   patinad --watch ~/drop --out ~/baked
   patina status; patina jobs; patina watch
-  patinad --watch ~/drop --out ~/baked --listen 127.0.0.1:7420 --token-file ~/.patina-token
+  patinad --watch ~/drop --out ~/baked --listen 127.0.0.1:7420
 )";
 
 }  // namespace

@@ -1,10 +1,14 @@
 #include "daemon/api/access.h"
 
+#include <fcntl.h>
 #include <strings.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 
+#include "daemon/api/tickets.h"
+#include "daemon/base/unique_fd.h"
 #include "formats/base/file_io.h"
 #include "formats/base/names.h"
 
@@ -13,6 +17,7 @@ namespace {
 
 constexpr size_t kMinTokenBytes = 16;
 constexpr size_t kMaxTokenBytes = 1024;
+constexpr size_t kMadeTokenBytes = 24;
 constexpr std::string_view kTokenCharacters =
     "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~+/=";
 
@@ -38,6 +43,23 @@ Result<std::string> ReadTokenFile(const std::string& path) {
   if (token.find_first_not_of(kTokenCharacters) != std::string::npos)
     return Unfit(path, "holds characters other than A-Z a-z 0-9 - . _ ~ + / =");
   return token;
+}
+
+Result<std::string> ReadOrMakeTokenFile(const std::string& path) {
+  const UniqueFd fd(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
+  if (!fd && errno != EEXIST) return FailErrno(errno, "cannot make the token file", path);
+  if (fd) {
+    PATINA_ASSIGN(std::string token, RandomName(kMadeTokenBytes));
+    token += "\n";
+    if (write(fd.get(), token.data(), token.size()) != static_cast<ssize_t>(token.size()) ||
+        fsync(fd.get()) != 0) {
+      const int error = errno;
+      // A short one would be refused at every start from now on.
+      unlink(path.c_str());
+      return FailErrno(error, "cannot write the token file", path);
+    }
+  }
+  return ReadTokenFile(path);
 }
 
 bool CarriesToken(std::string_view authorization, std::string_view token) {

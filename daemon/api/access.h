@@ -14,6 +14,10 @@ namespace patina::daemon {
 // than 16 characters or not made of those that a header can carry.
 Result<std::string> ReadTokenFile(const std::string& path);
 
+// The same, of a file that is made with a random token, for its owner alone, if it is not there.
+// Errors: also kIo (it cannot be made).
+Result<std::string> ReadOrMakeTokenFile(const std::string& path);
+
 // Whether an Authorization header carries the token; takes the same time for every wrong one.
 bool CarriesToken(std::string_view authorization, std::string_view token);
 

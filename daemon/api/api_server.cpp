@@ -62,7 +62,8 @@ Result<std::unique_ptr<ApiServer>> ApiServer::Start(const ApiConfig& config,
                   "TCP is asked for, and there is no token file: every user of this machine could "
                   "use the API; name one with --token-file, or leave TCP out");
     }
-    PATINA_ASSIGN(options.token, ReadTokenFile(config.token_file));
+    PATINA_ASSIGN(options.token, config.makes_token ? ReadOrMakeTokenFile(config.token_file)
+                                                    : ReadTokenFile(config.token_file));
   }
   auto server = std::make_unique<RunningApi>(options, service, source, log);
   PATINA_TRY(server->Begin(config));

@@ -371,6 +371,10 @@ class Loader {
       }
     }
     if (c.api.socket.empty() && !c.state_dir.empty()) c.api.socket = c.state_dir + "/patinad.sock";
+    if (!c.api.listen_host.empty() && c.api.token_file.empty() && !c.state_dir.empty()) {
+      c.api.token_file = c.state_dir + "/token";
+      c.api.makes_token = true;
+    }
     if (c.worker.empty()) c.worker = FindWorker(Variable("PATH"));
     const int usable = UsableCores();
     if (c.cores > usable) {
@@ -437,16 +441,13 @@ class Loader {
 
   void CheckToken() {
     const ApiConfig& api = loaded_.config.api;
-    if (api.listen_host.empty()) return;
-    if (api.token_file.empty()) {
-      return Complain(WhereIs("/api/listen"),
-                      "TCP needs a token: write a long random text into a file of mode 0600 and "
-                      "give --token-file FILE");
-    }
+    if (api.listen_host.empty() || api.token_file.empty()) return;
     const std::string where = WhereIs("/api/token_file");
     struct stat info;
-    if (::stat(api.token_file.c_str(), &info) != 0)
+    if (::stat(api.token_file.c_str(), &info) != 0) {
+      if (api.makes_token && errno == ENOENT) return;
       return Complain(where, FailErrno(errno, "cannot open", api.token_file).value().message);
+    }
     if ((info.st_mode & 077) != 0) {
       return Complain(where,
                       api.token_file + " can be read by others; chmod 600 " + api.token_file);

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "daemon/api/access.h"
 #include "daemon/api/api.h"
 #include "daemon/api/api_server.h"
 #include "daemon/api/listeners.h"
@@ -336,6 +337,33 @@ TEST_F(HttpServerTest, AsksForATokenOverTcp) {
   EXPECT_EQ(ask("Host: localhost\r\nAuthorization: Bearer 0123456789abcdef\r\n"), 200);
   EXPECT_EQ(ask("Host: evil.example\r\nAuthorization: Bearer 0123456789abcdef\r\n"), 403);
   EXPECT_EQ(Ask(socket_, "GET", "/v1/status").status, 200);
+}
+
+TEST_F(HttpServerTest, MakesATokenOnceWhereNobodyNamedOne) {
+  ApiConfig config;
+  config.socket = socket_;
+  config.listen_host = "127.0.0.1";
+  config.token_file = folder_ / "token";
+  const auto refused = ApiServer::Start(config, "/out", &service_, nullptr, &NoLog());
+  EXPECT_THAT(test::MessageOf(refused), HasSubstr("is not there"));
+  config.makes_token = true;
+  std::string tokens[2];
+  for (std::string& token : tokens) {
+    auto server = ApiServer::Start(config, "/out", &service_, nullptr, &NoLog());
+    ASSERT_OK(server);
+    struct stat info {};
+    ASSERT_EQ(stat(config.token_file.c_str(), &info), 0);
+    EXPECT_EQ(info.st_mode & 0777, 0600u);
+    auto read = ReadTokenFile(config.token_file);
+    ASSERT_OK(read);
+    token = *read;
+    RawClient client((*server)->tcp_port());
+    client.Send("GET /v1/status HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer " + token +
+                "\r\n\r\n");
+    EXPECT_EQ(client.ReadAnswer().status, 200);
+  }
+  EXPECT_GE(tokens[0].size(), 32u);
+  EXPECT_EQ(tokens[0], tokens[1]);
 }
 
 TEST_F(HttpServerTest, StopsWhileClientsListen) {

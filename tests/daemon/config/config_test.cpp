@@ -136,9 +136,16 @@ TEST_F(ConfigTest, RefusesFoldersThatLieInEachOther) {
   EXPECT_EQ(Problems(Load()), "");
 }
 
-TEST_F(ConfigTest, TcpNeedsATokenThatOthersCannotRead) {
+TEST_F(ConfigTest, WithoutATokenFileTheStateFolderHasOne) {
   flags_.listen = "127.0.0.1:7420";
-  EXPECT_TRUE(Has(Load(), "--listen", "needs a token"));
+  const LoadedConfig loaded = Load();
+  EXPECT_EQ(Problems(loaded), "");
+  EXPECT_EQ(loaded.config.api.token_file, loaded.config.state_dir + "/token");
+  EXPECT_TRUE(loaded.config.api.makes_token);
+}
+
+TEST_F(ConfigTest, ATokenFileThatIsNamedMustBeOneThatOthersCannotRead) {
+  flags_.listen = "127.0.0.1:7420";
   flags_.token_file = folder_ / "token";
   EXPECT_TRUE(Has(Load(), "--token-file", "cannot open"));
   std::ofstream(folder_ / "token") << "short\n";
