@@ -84,9 +84,12 @@ FileRole RoleOfFile(std::string_view name) {
   if (IsHiddenName(name)) return FileRole::kOther;
   const std::string text(name);
   // A scene or a list of images is baked with the images beside it.
-  if (HasImageExtension(text) || IsSceneFileName(text) || svbrdf::IsImageSetFileName(text))
-    return FileRole::kImage;
+  if (HasImageExtension(text) || NamesFilesBelow(text)) return FileRole::kImage;
   return brdf::HasBrdfExtension(text) ? FileRole::kBrdf : FileRole::kOther;
+}
+
+bool NamesFilesBelow(const std::string& name) {
+  return IsSceneFileName(name) || svbrdf::IsImageSetFileName(name);
 }
 
 bool IsHiddenName(std::string_view name) { return !name.empty() && name[0] == '.'; }

@@ -20,6 +20,10 @@ enum class FileRole {
 // By the name alone.
 FileRole RoleOfFile(std::string_view name);
 
+// Whether a file of this name may refer to files in folders below its own: a scene, a list of
+// images.
+bool NamesFilesBelow(const std::string& name);
+
 // Whether a folder is passed over for its name: it is hidden.
 bool IsHiddenName(std::string_view name);
 

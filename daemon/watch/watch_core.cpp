@@ -294,7 +294,7 @@ void WatchCore::ScanFolder(Folder* folder, bool deep, int64_t now_ns) {
     return;
   }
   if (folder->images.phase == Phase::kSettled && images.identity != folder->images.seen.identity)
-    Touch(&folder->images, "", now_ns);
+    TouchImages(folder, "", now_ns);
   ScanFiles(folder, *entries, now_ns);
   ScanChildFolders(folder, *entries, deep, now_ns);
 }
@@ -392,6 +392,7 @@ void WatchCore::OnFolderEvent(Folder* folder, const FolderEvent& event, int64_t 
     return;
   }
   RemoveTree(relative);
+  TouchAbove(relative, event.name, now_ns);
   if (event.kind == FolderEvent::Kind::kVanished) return;
   const auto entry = LookAt(Absolute(folder->relative), event.name);
   if (!entry) return;  // gone again
@@ -402,7 +403,7 @@ void WatchCore::OnFolderEvent(Folder* folder, const FolderEvent& event, int64_t 
 void WatchCore::OnFileEvent(Folder* folder, const FolderEvent& event, int64_t now_ns) {
   const FileRole role = RoleOfFile(event.name);
   if (role == FileRole::kNone || folder->images.seen.is_container) return;
-  if (role != FileRole::kBrdf) return Touch(&folder->images, event.name, now_ns);
+  if (role != FileRole::kBrdf) return TouchImages(folder, event.name, now_ns);
   const auto known = folder->files.find(event.name);
   if (known != folder->files.end()) return Touch(&known->second, event.name, now_ns);
   if (event.kind != FolderEvent::Kind::kVanished)

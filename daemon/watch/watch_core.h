@@ -84,6 +84,8 @@ class WatchCore {
     uint64_t bytes = 0;
     std::vector<std::string> names;  // of the files that are baked
     bool is_container = false;
+    bool spans_below =
+        false;  // has a scene or a list of images, whose files may lie in folders below
   };
 
   struct Folder;
@@ -151,6 +153,9 @@ class WatchCore {
   Unit* AddFile(Folder* folder, const std::string& name);
   void RemoveFile(Folder* folder, const std::string& name);
   void Touch(Unit* unit, const std::string& name, int64_t now_ns);
+  // The images of a folder, and those of folders above it whose scenes may refer to them.
+  void TouchImages(Folder* folder, const std::string& name, int64_t now_ns);
+  void TouchAbove(const std::string& relative, const std::string& name, int64_t now_ns);
   void Schedule(Unit* unit, int64_t at_ns);
   void Unschedule(Unit* unit);
   // Any of these may remove the unit.
@@ -160,6 +165,9 @@ class WatchCore {
   void Decide(Unit* unit, int64_t now_ns);
 
   Look LookAtImages(const Folder& folder, const std::vector<Entry>& entries) const;
+  // Adds the images of the folders below one; `path` is theirs as seen from it.
+  void LookBelow(const Folder& folder, const std::string& path, std::string* everything,
+                 std::string* images, Look* look) const;
   Result<Look> LookAtUnit(const Unit& unit) const;
   // The first file of the unit that somebody is writing to; empty if there is none.
   std::string OpenFileOf(const Unit& unit) const;

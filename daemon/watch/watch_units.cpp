@@ -134,6 +134,20 @@ void WatchCore::Touch(Unit* unit, const std::string& name, int64_t now_ns) {
   Schedule(unit, now_ns + probe_ns_);
 }
 
+void WatchCore::TouchImages(Folder* folder, const std::string& name, int64_t now_ns) {
+  Touch(&folder->images, name, now_ns);
+  TouchAbove(folder->relative, name, now_ns);
+}
+
+void WatchCore::TouchAbove(const std::string& relative, const std::string& name, int64_t now_ns) {
+  for (std::string above = relative; !above.empty();) {
+    const size_t slash = above.rfind('/');
+    above.resize(slash == std::string::npos ? 0 : slash);
+    Folder* folder = FindFolder(above);
+    if (folder != nullptr && folder->images.seen.spans_below) Touch(&folder->images, name, now_ns);
+  }
+}
+
 void WatchCore::Visit(Unit* unit, int64_t now_ns) {
   switch (unit->phase) {
     case Phase::kRestless:
@@ -261,13 +275,39 @@ WatchCore::Look WatchCore::LookAtImages(const Folder& folder,
     ++look.files;
     look.bytes += entry.size;
     look.names.push_back(entry.name);
+    look.spans_below = look.spans_below || NamesFilesBelow(entry.name);
   }
   look.is_container = manifest && weights;
+  if (look.spans_below && !look.is_container) LookBelow(folder, "", &everything, &images, &look);
   look.identity = look.is_container    ? "container"
                   : everything.empty() ? ""
                                        : Sha256Hex(std::string_view(everything));
   if (!images.empty() && !look.is_container) look.token = Sha256Hex(std::string_view(images));
   return look;
+}
+
+void WatchCore::LookBelow(const Folder& folder, const std::string& path, std::string* everything,
+                          std::string* images, Look* look) const {
+  for (const std::string& child_name : folder.children) {
+    const auto child =
+        folders_.find((folder.relative.empty() ? "" : folder.relative + "/") + child_name);
+    if (child == folders_.end() || child->second.images.seen.is_container) continue;
+    const auto entries = ListEntries(Absolute(child->first));
+    if (!entries) continue;  // its own unit says so
+    const std::string inner = path + child_name + "/";
+    for (Entry entry : *entries) {
+      if (entry.kind != Entry::Kind::kFile || entry.is_link ||
+          RoleOfFile(entry.name) != FileRole::kImage)
+        continue;
+      entry.name = inner + entry.name;
+      AppendIdentity(entry, everything);
+      AppendIdentity(entry, images);
+      ++look->files;
+      look->bytes += entry.size;
+      look->names.push_back(entry.name);
+    }
+    LookBelow(child->second, inner, everything, images, look);
+  }
 }
 
 Result<WatchCore::Look> WatchCore::LookAtUnit(const Unit& unit) const {

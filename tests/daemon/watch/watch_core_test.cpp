@@ -171,6 +171,43 @@ TEST(WatchCore, OffersOnlyTheAssetOfAChangedMapAgain) {
   EXPECT_NE(rig.ready[0].token, token);
 }
 
+TEST(WatchCore, OffersASceneAgainWhenATextureBelowItChanges) {
+  DropFolderRig rig;
+  rig.Write("shop/shop.gltf", "{}");
+  rig.Write("shop/textures/wood/albedo.png", "a");
+  rig.Write("other/albedo.png", "o");
+  rig.Advance(2 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), UnorderedElementsAre("shop", "shop_textures_wood", "other"));
+  rig.Advance(10 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), IsEmpty());
+  rig.Write("shop/textures/wood/albedo.png", "A");
+  rig.Advance(kSettle - 1);
+  EXPECT_THAT(rig.TakeReady(), IsEmpty());
+  rig.Advance(kSettle);
+  EXPECT_THAT(rig.TakeReady(), UnorderedElementsAre("shop", "shop_textures_wood"));
+  // A folder that is taken away, and one that no event tells of.
+  rig.Rename("shop/textures/wood", "other/wood");
+  rig.Advance(2 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), UnorderedElementsAre("shop", "other_wood"));
+  rig.events.deaf = true;
+  rig.Write("shop/textures/stone/albedo.png", "s");
+  rig.Advance(600 * 1000 + 2 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), UnorderedElementsAre("shop", "shop_textures_stone"));
+}
+
+TEST(WatchCore, WaitsForTexturesBelowAScene) {
+  DropFolderRig rig;
+  rig.Step();
+  rig.Write("shop/shop.gltf", "{}");
+  for (int i = 0; i < 5; ++i) {
+    rig.Advance(kSettle - 500);
+    rig.Write("shop/textures/map" + std::to_string(i) + ".png", "x");
+  }
+  EXPECT_THAT(rig.TakeReady(), IsEmpty());
+  rig.Advance(2 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), UnorderedElementsAre("shop", "shop_textures"));
+}
+
 TEST(WatchCore, OffersAFileReplacedByRename) {
   DropFolderRig rig;
   rig.Write("chrome.binary", "old");
