@@ -1,9 +1,7 @@
 #include "daemon/api/container_files.h"
 
 #include <fcntl.h>
-#include <linux/openat2.h>
 #include <sys/stat.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -34,19 +32,25 @@ constexpr Extension kExtensions[] = {
 
 Result<OpenedFile> OpenBelow(const std::string& folder, const std::string& name) {
   PATINA_TRY(CheckRelativePath(name, "file name"));
-  const UniqueFd root(open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
-  if (!root) return FailErrno(errno, "cannot open", folder);
-  open_how how{};
-  how.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
-  how.resolve = RESOLVE_BENEATH | RESOLVE_NO_SYMLINKS | RESOLVE_NO_MAGICLINKS;
+  // One part after another, none of them a link: without ".." that never leaves the folder. openat2
+  // would do it in one call, where containers and old kernels do not refuse it.
+  UniqueFd folder_fd(open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+  if (!folder_fd) return FailErrno(errno, "cannot open", folder);
   OpenedFile file;
-  file.fd =
-      UniqueFd(static_cast<int>(syscall(SYS_openat2, root.get(), name.c_str(), &how, sizeof how)));
-  if (!file.fd) {
-    const int error = errno;
-    if (error == ELOOP || error == EXDEV || error == ENOTDIR)
-      return Fail(ErrorCode::kNotFound, "there is no file " + QuoteForMessage(name));
-    return FailErrno(error, "cannot open", name);
+  for (size_t begin = 0; !file.fd;) {
+    const size_t slash = name.find('/', begin);
+    const bool last = slash == std::string::npos;
+    const std::string part = name.substr(begin, last ? slash : slash - begin);
+    const int flags = last ? O_RDONLY | O_NONBLOCK : O_PATH | O_DIRECTORY;
+    UniqueFd opened(openat(folder_fd.get(), part.c_str(), flags | O_NOFOLLOW | O_CLOEXEC));
+    if (!opened) {
+      const int error = errno;
+      if (error == ELOOP || error == ENOTDIR)
+        return Fail(ErrorCode::kNotFound, "there is no file " + QuoteForMessage(name));
+      return FailErrno(error, "cannot open", name);
+    }
+    (last ? file.fd : folder_fd) = std::move(opened);
+    begin = slash + 1;
   }
   struct stat info {};
   if (fstat(file.fd.get(), &info) != 0) return FailErrno(errno, "cannot look at", name);
