@@ -35,7 +35,7 @@ int Main(int port, bool with_browser, const std::string& source, const std::stri
   auto container = OpenContainer(path);
   if (!container) return FailWith(container.error());
   const std::string& kind = container->manifest.kind;
-  if (kind != "material" && kind != "brdf") {
+  if (kind != "material" && kind != "brdf" && kind != "svbrdf") {
     return FailWith({ErrorCode::kUnsupported, container->directory +
                                                   ": the viewer does not show kind " + kind +
                                                   "; its report.html has pictures of it"});

@@ -62,7 +62,7 @@ export const ONE_CONTAINER = "/v1/container";
 export async function loadContainer(base, said) {
   said("Loading manifest.json");
   const manifest = await get(`${base}/files/manifest.json`);
-  if (!["material", "brdf"].includes(manifest.kind)) {
+  if (!["material", "brdf", "svbrdf"].includes(manifest.kind)) {
     throw new Error(`manifest.json: /kind: ${JSON.stringify(manifest.kind)} is nothing that this viewer shows; ` +
       "open it with the version of Patina that baked it");
   }

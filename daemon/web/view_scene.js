@@ -17,6 +17,12 @@ export function lightPlace({lightX, lightY}) {
   return [lightX * scale, lightY * scale, z * scale];
 }
 
+// Texels of what varies over the surface, at the full size; of a BRDF that does not, one.
+export function sizeOf({manifest, bindings}) {
+  if (manifest.kind === "material") return manifest.source;
+  return bindings.textures.find(({name}) => name === "patina_feature_0") || {width: 1, height: 1, levels: 1};
+}
+
 export class Scene {
   constructor(canvas, container) {
     this.canvas = canvas;
@@ -31,8 +37,8 @@ export class Scene {
     const {gl} = context;
     this.gl = gl;
     this.canProbe = Boolean(context.extensions.floats);
-    const {manifest, bindings, textures, source} = this.container;
-    const shaders = this.kind === "brdf" ? brdfShaders(this.container) : materialShaders(this.container);
+    const {bindings, textures, source} = this.container;
+    const shaders = this.kind === "material" ? materialShaders(this.container) : brdfShaders(this.container);
     this.names = shaders.names;
     this.program = makeProgram(gl, shaders.vertex, shaders.fragment);
     this.others = new Map();
@@ -42,7 +48,7 @@ export class Scene {
       this.inPage = this.inPage || inPage;
       return {name: dds.name, texture};
     });
-    this.features = this.kind === "brdf" ? [] : this.textures.filter(({name}) => name.startsWith("patina_feature")).map(({texture}) => texture);
+    this.features = this.textures.filter(({name}) => name.startsWith("patina_feature")).map(({texture}) => texture);
     this.isSmooth = true;
     if (source) {
       source.textures.forEach((levels, i) =>
@@ -53,7 +59,8 @@ export class Scene {
       gl.bindBuffer(gl.UNIFORM_BUFFER, this.constants);
       gl.bufferData(gl.UNIFORM_BUFFER, this.container.constants, gl.STATIC_DRAW);
     }
-    const aspect = this.kind === "brdf" ? 1 : manifest.source.width / manifest.source.height;
+    const {width, height} = sizeOf(this.container);
+    const aspect = width / height;
     this.turns = bindings.address === "clamp" || aspect > 1 ? 1 : 2;
     this.shapes = {plane: plane(aspect), sphere: sphere(this.turns), cube: cube()};
     this.meshes = new Map();
@@ -154,7 +161,7 @@ export class Scene {
     return (performance.now() - begin) / drawn;
   }
 
-  probe(name, make, places, width, height, rows) {
+  probe(name, make, places, width, height, rows, place = [0, 0, 0]) {
     const gl = this.gl;
     const program = this.otherProgram(name, make);
     const texture = floatTexture(gl, width, rows, places);
@@ -162,6 +169,7 @@ export class Scene {
       const u = this.use(program);
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.uniform1i(u.u_places, this.textures.length);
+      if (u.u_place) gl.uniform3fv(u.u_place, place);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     });
     gl.deleteTexture(texture);
@@ -174,13 +182,13 @@ export class Scene {
     return [...this.probe("values", materialProbe, new Float32Array([u, v, mip, ofSource ? 1 : 0]), 1, rows, 1)].slice(0, channels);
   }
 
-  // f of a pair of directions.
-  brdfAt(wi, wo) {
-    return [...this.probe("brdf", brdfProbe, new Float32Array([...wi, 0, ...wo, 0]), 1, 1, 2)].slice(0, 3);
+  // f of a pair of directions at [u, v, mip].
+  brdfAt(wi, wo, place) {
+    return [...this.probe("brdf", brdfProbe, new Float32Array([...wi, 0, ...wo, 0]), 1, 1, 2, place)].slice(0, 3);
   }
 
-  // The lobe of light that comes in at an angle: f cos over all directions out, as a sheet. Returns its largest value.
-  makeLobe(thetaDegrees, phiDegrees, isLogarithmic) {
+  // The lobe of light that comes in at an angle, at [u, v, mip]: f cos over all directions out, as a sheet. Returns its largest value.
+  makeLobe(thetaDegrees, phiDegrees, isLogarithmic, place) {
     const angle = degrees => degrees * Math.PI / 180;
     const direction = (theta, phi) => [Math.sin(theta) * Math.cos(phi), Math.sin(theta) * Math.sin(phi), Math.cos(theta)];
     const wi = direction(angle(thetaDegrees), angle(phiDegrees));
@@ -194,7 +202,7 @@ export class Scene {
         places.set([...wo, 0], ((2 * row + 1) * width + column) * 4);
       }
     }
-    const f = this.probe("brdf", brdfProbe, places, width, height, 2 * height);
+    const f = this.probe("brdf", brdfProbe, places, width, height, 2 * height, place);
     const size = i => Math.max(f[4 * i], f[4 * i + 1], f[4 * i + 2], 0) * Math.max(directions[i][2], 0);
     let most = 1e-9;
     for (let i = 0; i < directions.length; ++i) most = Math.max(most, size(i));

@@ -269,14 +269,27 @@ ${cutoff}
   return {vertex: VERTEX, fragment, names: shown.names};
 }
 
-// A measured BRDF under the light and the middles of the studio's lamps.
-export function brdfShaders({manifest, shader}) {
+// Where the neural texture of a BRDF that varies is looked at: its level where one texel is as large as a pixel.
+const LEVEL = `
+uniform float u_mip;
+float level_of(vec2 uv) {
+  vec2 size = vec2(textureSize(patina_feature_0, 0)), x = dFdx(uv) * size, y = dFdy(uv) * size;
+  return u_mip >= 0.0 ? u_mip : max(0.5 * log2(max(max(dot(x, x), dot(y, y)), 1e-12)), 0.0);
+}`;
+
+const isVarying = ({manifest}) => manifest.kind === "svbrdf";
+
+// A measured BRDF under the light and the middles of the studio's lamps; one that varies, over its texture.
+export function brdfShaders(container) {
+  const {manifest, shader} = container;
   const fragment = `${VERSION}${shader}
 in vec3 v_place, v_normal, v_tangent;
 in vec2 v_uv;
 out vec4 o_color;
 ${STUDIO}
+${isVarying(container) ? LEVEL : ""}
 void main() {
+${isVarying(container) ? "  float level = level_of(v_uv);" : ""}
   vec3 n = normalize(v_normal), t = normalize(v_tangent - n * dot(n, v_tangent));
   if (dot(n, kEye - v_place) < 0.0) n = -n;
   mat3 local = transpose(mat3(t, cross(n, t), n));
@@ -286,7 +299,7 @@ void main() {
   for (int i = -1; i < lamps; ++i) {
     vec3 wi = local * (i < 0 ? normalize(u_light_place - v_place) : kLampAt[max(i, 0)]);
     vec3 power = i < 0 ? vec3(3.14159265 * u_light) : u_studio * kLamp[max(i, 0)].rgb * 6.2831853 / kLamp[max(i, 0)].w;
-    sum += power * patina_brdf(wi, wo) * max(wi.z, 0.0);
+    sum += power * ${isVarying(container) ? "patina_svbrdf(wi, wo, v_uv, level)" : "patina_brdf(wi, wo)"} * max(wi.z, 0.0);
   }
   sum = max(${TO_REC709[manifest.working_space] || ""}sum, 0.0);
   o_color = vec4(coded(tone(u_exposure * sum)), 1.0);
@@ -329,14 +342,15 @@ ${source ? "  if (place.w > 0.0) m = source_material(place.xy, place.z, m);" : "
 }`};
 }
 
-// Values of f at pairs of directions, wi in the upper row and wo in the lower one.
-export function brdfProbe({shader}) {
-  return {vertex: COVER, fragment: `${VERSION}${shader}
+// Values of f at pairs of directions, wi in the upper row and wo in the lower one; of a BRDF that varies all at one place.
+export function brdfProbe(container) {
+  return {vertex: COVER, fragment: `${VERSION}${container.shader}
 uniform highp sampler2D u_places;
+uniform vec3 u_place;   // u, v, mip
 out vec4 o_values;
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec3 wi = texelFetch(u_places, ivec2(at.x, 2 * at.y), 0).xyz, wo = texelFetch(u_places, ivec2(at.x, 2 * at.y + 1), 0).xyz;
-  o_values = vec4(patina_brdf(wi, wo), 1.0);
+  o_values = vec4(${isVarying(container) ? "patina_svbrdf(wi, wo, u_place.xy, u_place.z)" : "patina_brdf(wi, wo)"}, 1.0);
 }`};
 }

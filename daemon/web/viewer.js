@@ -5,7 +5,7 @@ import {askForToken} from "./token.js";
 import {loadContainer, mapsOf, ONE_CONTAINER} from "./view_container.js";
 import {Controls} from "./view_controls.js";
 import {listen} from "./view_pointer.js";
-import {Scene} from "./view_scene.js";
+import {Scene, sizeOf} from "./view_scene.js";
 
 // Of one frame while something is dragged, and of one that stays: what takes longer is drawn smaller.
 const SMOOTH_MS = 40, PATIENT_MS = 600, LEAST_SCALE = 0.2;
@@ -16,7 +16,7 @@ const MEASURED_FRAMES = 8;
 const START = {
   shape: "sphere", show: "lit", compare: "decoded", wipe: 0.5, gain: 8, exposure: 0, light: 2, studio: 1, lightX: -0.45, lightY: 0.5,
   yaw: 0, pitch: 0, zoom: 1, panX: 0, panY: 0, repeat: 1, mip: -1, smooth: true, full: false, drag: "light", theta: 45, phi: 0, logarithmic: false,
-  u: 0.5, v: 0.5, level: 0
+  u: 0.5, v: 0.5, level: 0, incoming: 30, outgoing: -30
 };
 const element = id => document.getElementById(id);
 const canvas = element("view");
@@ -83,8 +83,8 @@ function showLines() {
 }
 
 function changed(name) {
-  if (["theta", "phi", "logarithmic", "shape"].includes(name) && state.shape === "lobe") {
-    const most = scene.makeLobe(state.theta, state.phi, state.logarithmic);
+  if (["theta", "phi", "logarithmic", "shape", "u", "v", "level"].includes(name) && state.shape === "lobe") {
+    const most = scene.makeLobe(state.theta, state.phi, state.logarithmic, [state.u, state.v, state.level]);
     element("under").textContent = `Light from ${state.theta}° scattered to all directions: f cos θ, at most ${most.toPrecision(3)} /sr. ` +
       "Colours are those of f; drag turns it.";
   } else if (name === "shape") {
@@ -96,14 +96,14 @@ function changed(name) {
     if (state.shape === "lobe") Object.assign(state, {yaw: 0.5, pitch: 0.35, drag: "turn"});
     controls.refresh();
   }
-  if (["u", "v", "level"].includes(name)) showValues();
+  if (["u", "v", "level", "incoming", "outgoing"].includes(name)) showValues();
   showLines();
   draw();
 }
 
 function reset() {
-  const {shape, show, compare, u, v, level} = state;
-  Object.assign(state, START, {shape, show, compare, u, v, level});
+  const {shape, show, compare, u, v, level, incoming, outgoing} = state;
+  Object.assign(state, START, {shape, show, compare, u, v, level, incoming, outgoing});
   controls.refresh();
   changed("shape");
   announce("All is set back");
@@ -112,7 +112,7 @@ function reset() {
 // ---- what there is to be seen
 
 function showOptions() {
-  if (scene.kind === "brdf") return [];
+  if (scene.kind !== "material") return [];
   const {manifest} = container;
   const maps = mapsOf(manifest);
   const has = value => scene.names.includes(value);
@@ -127,7 +127,7 @@ function noteOf() {
   const {manifest, source} = container;
   const notes = [];
   if (scene.inPage) notes.push(`Textures are decoded by this page, to the same numbers: ${scene.inPage}.`);
-  if (scene.kind === "brdf") notes.push("Lit by the light and the middles of three lamps.");
+  if (scene.kind !== "material") notes.push("Lit by the light and the middles of three lamps.");
   else {
     const shaded = ["albedo", "normal", "roughness", "metalness", "ao", "emissive", "opacity", "clearcoat", "clearcoat_roughness"];
     const others = mapsOf(manifest).map(map => map.map).filter(map => !shaded.includes(map));
@@ -146,9 +146,9 @@ function showValues() {
     return;
   }
   const say = value => Number(value.toPrecision(6)).toString();
-  if (scene.kind === "brdf") {
+  if (scene.kind !== "material") {
     const direction = degrees => [Math.sin(degrees * Math.PI / 180), 0, Math.cos(degrees * Math.PI / 180)];
-    const f = scene.brdfAt(direction(state.u), direction(state.v));
+    const f = scene.brdfAt(direction(state.incoming), direction(state.outgoing), [state.u, state.v, state.level]);
     replace(target, table("f in 1/sr", ["", "value"], ["red", "green", "blue"].map((name, i) => [name, h("data", {value: String(f[i])}, say(f[i]))]), "numbers"));
     return;
   }
@@ -177,14 +177,13 @@ function numberField(name, label, least, most, step) {
 function buildPanel() {
   controls = new Controls(state, changed);
   const c = controls;
-  const isBrdf = scene.kind === "brdf";
-  if (isBrdf) Object.assign(state, {u: 30, v: -30});
-  const {manifest, source} = container;
+  const isBrdf = scene.kind !== "material", isPlaced = scene.kind !== "brdf";
+  const {manifest, bindings, source} = container;
   const lobes = scene.canProbe ? [["lobe", "Lobe"]] : [];
   const ev = value => `${value > 0 ? "+" : ""}${value.toFixed(1)} EV`;
   const times = value => `× ${value < 10 ? value.toFixed(2) : value.toFixed(0)}`;
   const logarithm = {to: value => 2 ** value, from: value => Math.log2(value)};
-  const levels = isBrdf ? 1 : manifest.source.levels;
+  const {levels} = sizeOf(container);
   const whole = isBrdf ? [] : [
     c.group("Show", c.select("show", "What is shown", showOptions())),
     c.group("Compare", c.choices("compare", "Compare", [["decoded", "Decoded"], ["source", "Source", !source], ["wipe", "Wipe", !source],
@@ -192,13 +191,14 @@ function buildPanel() {
     source ? c.slider("gain", "Gain of the difference", 0, 8, 0.5, times, logarithm)
       : h("p", {class: "quiet"}, "The source is not here. ", h("code", {}, "patina view CONTAINER --source FOLDER"),
         " puts the maps it was baked from beside it, filtered as they were for the bake."))];
-  const sampling = isBrdf ? [] : [
-    manifest.source.address === "clamp" ? false : c.slider("repeat", "Repeated", 1, 8, 1, value => `${value} ×`),
+  const sampling = !isPlaced ? [] : [
+    bindings.address === "clamp" ? false : c.slider("repeat", "Repeated", 1, 8, 1, value => `${value} ×`),
     c.slider("mip", "Mip", -1, levels - 1, 1, value => value < 0 ? "as the screen calls for" : String(value)),
     c.tick("smooth", "Filter textures (off: the texels of the features)")];
-  const values = isBrdf
-    ? [h("div", {class: "fields"}, numberField("u", "light, °", -89, 89, 1), numberField("v", "view, °", -89, 89, 1))]
-    : [h("div", {class: "fields"}, numberField("u", "u", -16, 16, "any"), numberField("v", "v", -16, 16, "any"), numberField("level", "mip", 0, 20, "any"))];
+  const angles = h("div", {class: "fields"}, numberField("incoming", "light, °", -89, 89, 1), numberField("outgoing", "view, °", -89, 89, 1));
+  const place = h("div", {class: "fields"}, numberField("u", "u", -16, 16, "any"), numberField("v", "v", -16, 16, "any"),
+    numberField("level", "mip", 0, 20, "any"));
+  const values = [isBrdf && angles, isPlaced && place];
   replace(element("panel"),
     c.group("Shape", c.choices("shape", "Shape", [["plane", "Plane"], ["sphere", "Sphere"], ["cube", "Cube"], ...(isBrdf ? lobes : [])]),
       isBrdf && h("div", {"data-for": "lobe", hidden: true}, c.slider("theta", "Angle of the light", 0, 88, 1, value => `${value}°`),
@@ -233,6 +233,7 @@ function showFacts() {
     if (manifest.network) cells.push(["network", `${manifest.network.inputs} → ${manifest.network.hidden} → ${manifest.network.outputs}`]);
     cells.push(["profile", manifest.profile]);
   } else {
+    if (manifest.kind === "svbrdf") cells.push(["texels", `${sizeOf(container).width} × ${sizeOf(container).height}`]);
     cells.push(["network", manifest.brdf.network.layers.join(" → ")], ["Nside", String(manifest.brdf.nside)], ["source", manifest.source.format]);
   }
   replace(element("facts"), facts(cells));
@@ -303,7 +304,7 @@ function start() {
   });
   new ResizeObserver(draw).observe(element("frame"));
   weigh();
-  if (scene.kind !== "brdf" || scene.canProbe) showValues();
+  if (scene.kind === "material" || scene.canProbe) showValues();
   showLines();
   draw();
 }

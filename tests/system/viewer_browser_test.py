@@ -4,7 +4,7 @@
 usage: viewer_browser_test.py PATINA DECODER_VALUES FOLDER [--quick]
 
 Bakes small samples: a material, one whose textures WebGL does not take as blocks, one of a scene with constant channels,
-and a measured BRDF. Holds the values that the page reads back from its shader against those of the C++ decoder, and the
+a measured BRDF, and one that varies over a surface. Holds the values that the page reads back from its shader against those of the C++ decoder, and the
 pixels of a single channel against what they stand for; looks at all with our checks of accessibility and those of
 axe-core, on a wide screen and on a phone, in the light and in the dark; takes the context away and gives it back;
 damages a file. Fails on an error in the browser's console. Leaves a screenshot of each view in FOLDER, which is made
@@ -137,7 +137,7 @@ def read_values(page):
 
 
 def expected_values(decoder_values, container, places):
-    text = "".join(f"{u} {v} {mip}\n" for u, v, mip in places)
+    text = "".join(" ".join(str(number) for number in place) + "\n" for place in places)
     made = subprocess.run([decoder_values, container], input=text, capture_output=True, text=True, check=True)
     return [[float(value) for value in line.split()] for line in made.stdout.splitlines()]
 
@@ -225,32 +225,49 @@ def check_pixels(page, decoder_values, container, name, wrong):
         pick(page, control, value)
 
 
-def check_brdf(page, patina, container, scratch, wrong):
-    pairs, csv = [], ""
+def pairs_of_angles(page, count):
+    """Pairs of angles in degrees, and for each the directions as the page takes them, as text."""
     rng = random.Random(3)
-    for _ in range(12):
-        pairs.append((rng.randrange(-85, 86), rng.randrange(-85, 86)))
-    with open(os.path.join(scratch, "pairs.csv"), "w", encoding="utf-8") as file:
-        for light, view in pairs:
-            # sin and cos of whole degrees, as the page takes them.
-            csv += page.value(f"[{light}, {view}].map(d => `${{Math.fround(Math.sin(d * Math.PI / 180))}},0,${{Math.fround(Math.cos(d * Math.PI / 180))}}`).join(',')") + "\n"
-        file.write(csv)
-    made = subprocess.run([patina, "eval", container, "--pairs", file.name], capture_output=True, text=True, check=True)
-    expected = [[float(value) for value in line.split(",")] for line in made.stdout.splitlines()]
+    pairs = [(rng.randrange(-85, 86), rng.randrange(-85, 86)) for _ in range(count)]
+    # sin and cos of whole degrees.
+    return pairs, [page.value(f"[{light}, {view}].map(d => `${{Math.fround(Math.sin(d * Math.PI / 180))}},0,"
+                              "${Math.fround(Math.cos(d * Math.PI / 180))}`).join(',')") for light, view in pairs]
+
+
+def check_f(page, name, pairs, expected, wrong):
+    """What the page reads back of f at pairs of angles."""
     worst = 0
     log1p = lambda value: math.log1p(max(value, 0))
     span = max(log1p(value) for line in expected for value in line) or 1
     for (light, view), want in zip(pairs, expected):
-        pick(page, "u", light)
-        pick(page, "v", view)
+        pick(page, "incoming", light)
+        pick(page, "outgoing", view)
         got = [row[0] for row in read_values(page)]
         for a, b in zip(got, want):
             error = abs(log1p(a) - log1p(b)) / max(span, 1)
             worst = max(worst, error)
             if not error <= BRDF_BOUND:
-                wrong.append(f"brdf: f from {light} to {view} degrees is {got}, the decoder has {want}")
+                wrong.append(f"{name}: f from {light} to {view} degrees is {got}, the decoder has {want}")
                 break
-    print(f"brdf: {len(pairs)} pairs of directions, largest error {worst:.2e} of log(1 + f) (bound {BRDF_BOUND:g})")
+    print(f"{name}: {len(pairs)} pairs of directions, largest error {worst:.2e} of log(1 + f) (bound {BRDF_BOUND:g})")
+
+
+def check_brdf(page, patina, container, scratch, wrong):
+    pairs, directions = pairs_of_angles(page, 12)
+    with open(os.path.join(scratch, "pairs.csv"), "w", encoding="utf-8") as file:
+        file.write("".join(line + "\n" for line in directions))
+    made = subprocess.run([patina, "eval", container, "--pairs", file.name], capture_output=True, text=True, check=True)
+    check_f(page, "brdf", pairs, [[float(value) for value in line.split(",")] for line in made.stdout.splitlines()], wrong)
+
+
+def check_varying(page, decoder_values, container, wrong):
+    """f of a BRDF that varies, at places between texels and mips."""
+    pairs, directions = pairs_of_angles(page, 6)
+    for place in ((0.5, 0.5, 0), (0.28125, 0.71875, 1), (0.90625, 0.125, 1.5)):
+        for name, value in zip(("u", "v", "level"), place):
+            pick(page, name, value)
+        places = [(*place, *line.split(",")) for line in directions]
+        check_f(page, f"varying at {place}", pairs, expected_values(decoder_values, container, places), wrong)
 
 
 def check_bc6h(page, wrong):
@@ -383,7 +400,9 @@ def bake(patina, scratch, is_quick):
     run("bake", maps, *common)
     run("bake", at("odd"), *common)
     run("bake", os.path.join(at("wall/brdf"), brdf), *common)
-    containers = {"material": "maps", "scene": "mosaic_wet_floor", "odd": "odd", "brdf": brdf.split(".")[0]}
+    run("sample", "--kind", "btf", "--out", at("btf"), "--size", "16")
+    run("bake", at("btf"), *common)
+    containers = {"material": "maps", "scene": "mosaic_wet_floor", "odd": "odd", "brdf": brdf.split(".")[0], "varying": "bumps"}
     return {kind: os.path.join(at("baked"), name) for kind, name in containers.items()}, maps
 
 
@@ -406,6 +425,11 @@ def use(page, patina, decoder_values, scratch, folder, is_quick):
                 check_brdf(page, patina, container, scratch, wrong)
                 pick(page, "shape", "lobe")
                 look(page, "brdf-lobe", folder, wrong)
+            elif name == "varying":
+                check_varying(page, decoder_values, container, wrong)
+                pick(page, "shape", "lobe")
+                drawn(page)
+                page.screenshot(os.path.join(folder, "varying-lobe.png"))
             else:
                 check_values(page, decoder_values, container, name, wrong)
                 check_pixels(page, decoder_values, container, name, wrong)
