@@ -36,8 +36,9 @@ enum class EndCause {
   kOutOfMemory,  // ended by the farm for it
   kTimeLimit,
   kPreempted,
-  kCancelled,  // on the farm, by somebody else
-  kRefused     // the farm does not take it
+  kAskedToEnd,  // and did; as before a time limit
+  kCancelled,   // on the farm, by somebody else
+  kRefused      // the farm does not take it
 };
 
 // What happened to an attempt since the last look.

@@ -13,6 +13,7 @@ constexpr uint64_t kMaxResultBytes = uint64_t{4} << 20;
 constexpr uint64_t kMaxListBytes = uint64_t{1} << 20;
 // What a shell, or env, says of a program that it cannot run; and WorkerScript of its folder.
 constexpr int kNoFolder = 75, kCannotExecute = 126, kNotFound = 127;
+constexpr int kInterrupted = 130;  // what `patina run` says after a signal that asks it to end
 
 std::vector<std::string> ReadLines(const std::string& path) {
   std::vector<std::string> lines;
@@ -101,7 +102,8 @@ EndCause CauseOf(const FarmJob& job, bool started) {
       // A node without the shared disk, or without the program.
       const bool cannot = job.exit_code == kNoFolder || job.exit_code == kCannotExecute ||
                           job.exit_code == kNotFound;
-      return !started || cannot ? EndCause::kNodeFailed : EndCause::kNone;
+      if (!started || cannot) return EndCause::kNodeFailed;
+      return job.exit_code == kInterrupted ? EndCause::kAskedToEnd : EndCause::kNone;
     }
     case FarmState::kUnknown:
     case FarmState::kWaiting:

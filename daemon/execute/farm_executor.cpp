@@ -16,13 +16,14 @@ namespace {
 constexpr int kSubmissionsAtOnce = 4;
 constexpr int kCancelsAtOnce = 4;
 constexpr int kMostRefusals = 3;
-constexpr int kLooksAtOnce = 100;          // at files of attempts, in one Poll
-constexpr int64_t kMsPerLook = 2;          // so that 10,000 of them are seen in 20 s
-constexpr int64_t kLookUpMs = 250;         // between rounds that submissions wait for
-constexpr int64_t kResultLookMs = 250;     // between looks for a result that is due
-constexpr int64_t kCancelAgainMs = 10000;  // if it is still there then
-constexpr int64_t kRoundShare = 4;         // after a round, so many times as long without one
-constexpr int64_t kMostWaitMs = 60000;     // between tries, while the farm does not answer
+constexpr int kLooksAtOnce = 100;              // at files of attempts, in one Poll
+constexpr int64_t kMsPerLook = 2;              // so that 10,000 of them are seen in 20 s
+constexpr int64_t kLookUpMs = 250;             // between rounds that submissions wait for
+constexpr int64_t kResultLookMs = 250;         // between looks for a result that is due
+constexpr int64_t kCancelAgainMs = 10000;      // if it is still there then
+constexpr int64_t kRoundShare = 4;             // after a round, so many times as long without one
+constexpr int64_t kMostWaitMs = 60000;         // between two looks at anything
+constexpr int64_t kMostFailingWaitMs = 20000;  // between rounds, while the farm does not answer
 
 using Key = std::pair<int64_t, int64_t>;  // job, attempt
 
@@ -214,8 +215,9 @@ class FarmExecutor : public Executor {
     last_round_end_ms_ = clock_.SteadyMs();
     last_round_ms_ = last_round_end_ms_ - round_begin_ms_;
     if (!trouble.empty()) {
+      last_round_ms_ = 0;  // It was not the farm's work that took so long.
       failing_wait_ms_ = std::clamp<int64_t>(
-          failing_wait_ms_ * 2, std::min<int64_t>(options_.poll_ms, 1000), kMostWaitMs);
+          failing_wait_ms_ * 2, std::min<int64_t>(options_.poll_ms, 1000), kMostFailingWaitMs);
       return SetProblem(commands_->name() + " does not say how its jobs are: " + trouble +
                         "; they go on, and none is taken for failed. Look at its controller");
     }

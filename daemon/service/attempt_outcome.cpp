@@ -73,6 +73,8 @@ LostTo WhatLostIt(EndCause cause) {
       return {"timeout", "it took longer than the farm allows"};
     case EndCause::kPreempted:
       return {"preempted", "the farm gave its place to another job"};
+    case EndCause::kAskedToEnd:
+      return {"interrupted", "the farm asked it to end, as at its limit of time"};
     case EndCause::kCancelled:
       return {"killed", "it was cancelled on the farm, and not by `patina cancel`"};
     case EndCause::kRefused:

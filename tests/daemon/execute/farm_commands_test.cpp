@@ -59,6 +59,7 @@ TEST(SlurmCommands, KnowWhatWasTheMachinesFault) {
   EXPECT_EQ(cause("CANCELLED"), EndCause::kCancelled);
   EXPECT_EQ(cause("COMPLETED"), EndCause::kNone);
   EXPECT_EQ(cause("FAILED", "768"), EndCause::kNone) << "exit code 3 is the program's own";
+  EXPECT_EQ(cause("FAILED", "33280"), EndCause::kAskedToEnd) << "130: it was told to end";
   EXPECT_EQ(cause("FAILED", "768", false), EndCause::kNodeFailed) << "it never began";
   EXPECT_EQ(cause("FAILED", "32512"), EndCause::kNodeFailed) << "127: the program is not there";
 }

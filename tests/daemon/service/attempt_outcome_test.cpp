@@ -63,6 +63,7 @@ TEST_F(Outcome, WhatAFarmLosesIsTriedAgain) {
                                                      {EndCause::kOutOfMemory, "out_of_memory"},
                                                      {EndCause::kTimeLimit, "timeout"},
                                                      {EndCause::kPreempted, "preempted"},
+                                                     {EndCause::kAskedToEnd, "interrupted"},
                                                      {EndCause::kCancelled, "killed"},
                                                      {EndCause::kRefused, "refused"}}) {
     report_ = {};
