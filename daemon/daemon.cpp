@@ -8,7 +8,6 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <random>
 
@@ -19,7 +18,7 @@
 #include "daemon/base/state_lock.h"
 #include "daemon/config/config.h"
 #include "daemon/drop_folders.h"
-#include "daemon/execute/local_executor.h"
+#include "daemon/make_executor.h"
 #include "daemon/options.h"
 #include "daemon/queue/job_store.h"
 #include "daemon/service/daemon_service.h"
@@ -35,29 +34,6 @@ std::vector<std::string> Environment() {
   for (char** entry = environ; entry != nullptr && *entry != nullptr; ++entry)
     entries.emplace_back(*entry);
   return entries;
-}
-
-// What of the daemon's environment a job's process sees.
-std::vector<std::string> WorkerEnvironment() {
-  std::vector<std::string> kept;
-  for (const std::string& entry : Environment()) {
-    for (const char* name : {"PATH=", "LANG=", "LC_ALL=", "TZ=", "LD_LIBRARY_PATH=", "PATINA_SIMD=",
-                             "ASAN_OPTIONS=", "UBSAN_OPTIONS=", "TSAN_OPTIONS="}) {
-      if (entry.rfind(name, 0) == 0) kept.push_back(entry);
-    }
-  }
-  return kept;
-}
-
-// The colour configuration of jobs that name none is the operator's: where it lies is not asked.
-void PassOnColorConfig(LocalExecutorOptions* options) {
-  const char* named = std::getenv("OCIO");
-  if (named == nullptr || *named == '\0') return;
-  // Jobs run in folders of their own.
-  std::error_code error;
-  const std::filesystem::path path = std::filesystem::weakly_canonical(named, error);
-  options->environment.push_back("OCIO=" + (error ? named : path.string()));
-  if (!error) options->read.push_back(path.parent_path().string());
 }
 
 void PrintProblems(const LoadedConfig& loaded) {
@@ -76,21 +52,14 @@ int CheckConfig(const LoadedConfig& loaded) {
                  loaded.problems.size() == 1 ? "problem" : "problems");
     return kExitBadInput;
   }
+  auto answer = AskFarm(loaded.config, SystemClock());
+  if (!answer) {
+    std::fprintf(stderr, "patinad: error: %s\n", answer.error().message.c_str());
+    return kExitBadInput;
+  }
+  std::fputs(answer->c_str(), stdout);
   std::printf("patinad: the configuration is good\n");
   return kExitDone;
-}
-
-LocalExecutorOptions ExecutorOptions(const Config& config) {
-  LocalExecutorOptions options;
-  options.worker = config.worker;
-  options.nice = config.nice;
-  options.environment = WorkerEnvironment();
-  PassOnColorConfig(&options);
-  using Sandbox = LocalExecutorOptions::Sandbox;
-  options.sandbox = config.sandbox == SandboxMode::kOff       ? Sandbox::kOff
-                    : config.sandbox == SandboxMode::kRequire ? Sandbox::kRequired
-                                                              : Sandbox::kIfPossible;
-  return options;
 }
 
 class Daemon {
@@ -112,6 +81,7 @@ class Daemon {
                         {"state_dir", config_.state_dir},
                         {"out", config_.out},
                         {"socket", config_.api.socket},
+                        {"executor", ExecutorKindName(config_.executor.kind)},
                         {"cores", config_.cores}});
     if (api_->tcp_port() != 0) {
       const bool v6 = config_.api.listen_host.find(':') != std::string::npos;
@@ -141,11 +111,18 @@ class Daemon {
     PATINA_TRY(MakePrivate(config_.state_dir));
     PATINA_ASSIGN(StateLock lock, StateLock::Acquire(config_.state_dir));
     lock_.emplace(std::move(lock));
-    PATINA_TRY(MakePrivate(config_.state_dir + "/jobs"));
+    const std::string work_dir = WorkFolderOf(config_);
+    if (work_dir != config_.state_dir) {
+      // Two daemons with one queue each must not share folders of jobs.
+      PATINA_TRY(MakePrivate(work_dir));
+      PATINA_ASSIGN(StateLock work_lock, StateLock::Acquire(work_dir));
+      work_lock_.emplace(std::move(work_lock));
+    }
+    PATINA_TRY(MakePrivate(work_dir + "/jobs"));
     PATINA_TRY(MakeDirectories(config_.out, files_));
     if (!config_.failed_dir.empty()) PATINA_TRY(MakeDirectories(config_.failed_dir, files_));
     PATINA_ASSIGN(store_, JobStore::Open(config_.state_dir + "/queue.db"));
-    PATINA_ASSIGN(executor_, MakeLocalExecutor(ExecutorOptions(config_), files_, log_));
+    PATINA_ASSIGN(executor_, MakeExecutor(config_, Environment(), files_, SystemClock(), log_));
     const uint64_t seed = (uint64_t{std::random_device()()} << 32) | std::random_device()();
     PATINA_ASSIGN(service_, DaemonService::Create(
                                 {*store_, *executor_, files_, SystemClock(), log_}, config_, seed));
@@ -210,6 +187,7 @@ class Daemon {
       fresh.worker = config_.worker;
       fresh.nice = config_.nice;
       fresh.sandbox = config_.sandbox;
+      fresh.executor = config_.executor;
       config_ = fresh;
       log_.Configure(config_.log_level, config_.log_format);
       service_->Reconfigure(config_);
@@ -225,7 +203,7 @@ class Daemon {
   FileCalls& files_;
   Logger log_;
   UniqueFd signals_;
-  std::optional<StateLock> lock_;
+  std::optional<StateLock> lock_, work_lock_;
   std::unique_ptr<JobStore> store_;
   std::unique_ptr<Executor> executor_;
   std::unique_ptr<DaemonService> service_;

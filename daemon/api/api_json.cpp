@@ -208,6 +208,7 @@ std::string StatusJson(const ServiceStatus& status) {
   json["state_dir"] = status.state_dir;
   json["out"] = status.out;
   json["queue_paused"] = status.queue_paused;
+  json["executor"] = status.executor;
   json["cores"] = status.cores;
   json["cores_used"] = status.cores_used;
   json["jobs"] = CountsToJson(status.counts);

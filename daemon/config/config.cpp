@@ -177,6 +177,7 @@ class Loader {
     if (std::string listen; Take(api, "listen", &listen), !listen.empty())
       SetListen(listen, file + ": /api/listen");
     Take(json, "cores", &c.cores);
+    ReadExecutor(json, FolderOf(file), &c.executor);
     Take(json, "nice", &c.nice);
     TakeNamed(json, "sandbox", ParseSandboxMode, &c.sandbox);
     const Json& limits = Object(json, "limits");
@@ -377,7 +378,7 @@ class Loader {
     }
     if (c.worker.empty()) c.worker = FindWorker(Variable("PATH"));
     const int usable = UsableCores();
-    if (c.cores > usable) {
+    if (c.cores > usable && !OnFarm(c)) {
       Warn(WhereIs("/cores"), std::to_string(c.cores) + " cores are more than the " +
                                   std::to_string(usable) + " that patinad may use");
     }
@@ -427,6 +428,14 @@ class Loader {
                                            " bytes); give --socket");
     }
     CheckToken();
+    for (const std::string& problem : ExecutorProblems(c.executor)) {
+      // Each begins with its pointer.
+      const size_t end = problem.find(' ');
+      Complain(c.file + ": " + problem.substr(0, end), problem.substr(end + 1));
+    }
+    if (OnFarm(c) && c.sandbox == SandboxMode::kRequire)
+      Complain(WhereIs("/sandbox"),
+               "a farm's nodes have no sandbox of patinad; set it to \"auto\"");
     if (c.retry.base_ms > c.retry.max_ms) {
       Complain(WhereIs("/retry/base_ms"),
                "must not be larger than /retry/max_ms: " + std::to_string(c.retry.base_ms) + " > " +
@@ -517,6 +526,7 @@ std::string ConfigToJson(const Config& c) {
   json["cores"] = c.cores;
   json["nice"] = c.nice;
   json["sandbox"] = SandboxModeName(c.sandbox);
+  json["executor"] = ExecutorToJson(c.executor);
   json["limits"] = {{"threads", c.limits.threads},
                     {"memory_mb", c.limits.memory_mb},
                     {"max_memory_mb", c.limits.max_memory_mb},
@@ -544,7 +554,8 @@ std::vector<std::string> RestartOnlyChanges(const Config& before, const Config& 
     return found == json.end() ? Json() : *found;
   };
   std::vector<std::string> names;
-  for (const char* key : {"state_dir", "out", "watch", "api", "worker", "nice", "sandbox"}) {
+  for (const char* key :
+       {"state_dir", "out", "watch", "api", "worker", "nice", "sandbox", "executor"}) {
     if (part(before, key) != part(after, key)) names.emplace_back(key);
   }
   return names;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/base/log.h"
+#include "daemon/config/executor_config.h"
 #include "formats/base/result.h"
 #include "pipeline/material/train.h"
 
@@ -82,9 +83,10 @@ struct Config {
   std::vector<std::string> input_roots, output_roots;
   ApiConfig api;
   std::string worker;  // the `patina` program; default: beside this program, else from PATH
-  int cores = 0;       // core budget; resolved: never 0 after loading
+  int cores = 0;       // core budget, on a farm that of one job; never 0 after loading
   int nice = 5;        // of jobs
   SandboxMode sandbox = SandboxMode::kAuto;
+  ExecutorConfig executor;
   LimitsConfig limits;
   RetryConfig retry;
   RetentionConfig retention;
@@ -117,15 +119,23 @@ struct LoadedConfig {
 LoadedConfig LoadConfig(const std::string& file, const std::vector<std::string>& environment,
                         const ConfigOverrides& flags);
 
+inline bool OnFarm(const Config& config) { return config.executor.kind != ExecutorKind::kLocal; }
+
+// Holds what jobs read and write besides their input and output.
+inline const std::string& WorkFolderOf(const Config& config) {
+  return config.executor.shared_dir.empty() ? config.state_dir : config.executor.shared_dir;
+}
+
 // Where the API puts what clients send; jobs may read it.
-inline std::string UploadFolderOf(const Config& config) { return config.state_dir + "/uploads"; }
+inline std::string UploadFolderOf(const Config& config) {
+  return WorkFolderOf(config) + "/uploads";
+}
 
 // The configuration in effect, as a configuration file.
 std::string ConfigToJson(const Config& config);
 
-// What may be changed by a reload: all but state_dir, out, watch, api, worker, nice and
-// sandbox. Returns the names
-// of the others that differ.
+// What may be changed by a reload: all but state_dir, out, watch, api, worker, nice, sandbox and
+// executor. Returns the names of the others that differ.
 std::vector<std::string> RestartOnlyChanges(const Config& before, const Config& after);
 
 }  // namespace patina::daemon

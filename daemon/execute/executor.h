@@ -1,5 +1,5 @@
-// Where attempts at jobs run: as child processes of this machine (local_executor.h), or elsewhere.
-// An executor knows folders, limits and processes, and nothing of the queue.
+// Where attempts at jobs run: as child processes of this machine (local_executor.h), or on a farm
+// (farm_executor.h). An executor knows folders, limits and processes, and nothing of the queue.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,21 @@ struct AttemptSpec {
   std::vector<std::string> inputs;   // files and folders that are read
   bool skip_unchanged = false;       // see `patina run --help`
   std::string force_past;            // a revision, for a retry of a forced job; may be empty
+  int threads = 1;                   // that it will use
   int64_t memory_mb = 0, cpu_s = 0;  // 0: no limit
+  int64_t wall_s = 0;                // the same; kept by a farm, by the caller of a local executor
+};
+
+// What an executor knows of why an attempt ended, if it was not the program's doing.
+enum class EndCause {
+  kNone,
+  kNodeFailed,   // also: could not be started there
+  kOutOfMemory,  // ended by the farm for it
+  kTimeLimit,
+  kPreempted,
+  kAskedToEnd,  // and did; as before a time limit
+  kCancelled,   // on the farm, by somebody else
+  kRefused      // the farm does not take it
 };
 
 // What happened to an attempt since the last look.
@@ -32,11 +46,15 @@ struct AttemptReport {
   int64_t job = 0;
   int64_t attempt = 0;
   std::vector<std::string> events;  // complete new lines of events.ndjson
-  bool ended = false;               // all its processes are dead, and nothing of it writes any more
+  // All its processes are dead and nothing of it writes any more; or, where that cannot be known,
+  // it cannot publish any more.
+  bool ended = false;
   // Of an attempt that ended:
   int exit_code = -1;       // -1: it was killed, or nobody knows
   int signal = 0;           // 0: it was not, or nobody knows
   std::string result_json;  // content of result.json; empty: there is none
+  EndCause cause = EndCause::kNone;
+  std::string detail;  // of the cause, for people; may be empty
 };
 
 enum class StopMode { kTerminate, kKill };
@@ -65,6 +83,8 @@ class Executor {
   // When Poll wants to be called at the latest though the descriptor says nothing: milliseconds
   // from now, -1: never.
   virtual int poll_timeout_ms() const = 0;
+  // What keeps all attempts from going on at present, and the cure; empty: nothing.
+  virtual std::string problem() const { return ""; }
 };
 
 }  // namespace patina::daemon

@@ -17,6 +17,7 @@
 #include "daemon/execute/child_process.h"
 #include "daemon/execute/event_tail.h"
 #include "daemon/execute/sandbox.h"
+#include "daemon/execute/worker_command.h"
 
 namespace patina::daemon {
 namespace {
@@ -91,22 +92,7 @@ class LocalExecutor : public Executor {
     const UniqueFd log(log_fd);
 
     ChildSpec child;
-    child.arguments = {options_.worker,
-                       "run",
-                       spec.folder + "/job.json",
-                       "--events",
-                       spec.folder + "/events.ndjson",
-                       "--result",
-                       spec.folder + "/result.json",
-                       "--fence",
-                       spec.fence,
-                       "--attempt",
-                       std::to_string(spec.attempt)};
-    if (spec.skip_unchanged) child.arguments.push_back("--skip-unchanged");
-    if (!spec.force_past.empty()) {
-      child.arguments.push_back("--not-revision");
-      child.arguments.push_back(spec.force_past);
-    }
+    child.arguments = WorkerCommand(options_.worker, spec);
     child.environment = options_.environment;
     child.folder = spec.folder;
     child.log_fd = log.get();

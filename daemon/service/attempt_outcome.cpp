@@ -57,6 +57,34 @@ std::string SignalText(int signal) {
   return name != nullptr ? "SIG" + std::string(name) : "signal " + std::to_string(signal);
 }
 
+struct LostTo {
+  const char* code;
+  const char* message;
+};
+
+// Of attempts that a farm lost.
+LostTo WhatLostIt(EndCause cause) {
+  switch (cause) {
+    case EndCause::kNodeFailed:
+      return {"node_failed", "the node failed it"};
+    case EndCause::kOutOfMemory:
+      return {"out_of_memory", "it needed more memory than it was given"};
+    case EndCause::kTimeLimit:
+      return {"timeout", "it took longer than the farm allows"};
+    case EndCause::kPreempted:
+      return {"preempted", "the farm gave its place to another job"};
+    case EndCause::kAskedToEnd:
+      return {"interrupted", "the farm asked it to end, as at its limit of time"};
+    case EndCause::kCancelled:
+      return {"killed", "it was cancelled on the farm, and not by `patina cancel`"};
+    case EndCause::kRefused:
+      return {"refused", "the farm does not take it"};
+    case EndCause::kNone:
+      break;
+  }
+  return {"lost", "its process is gone and left no result"};
+}
+
 // Whether an error that `patina run` reported may be gone next time.
 bool IsOfTheMachine(const ResultFile& result) {
   return result.exit_code == kExitInterrupted ||
@@ -110,6 +138,14 @@ AttemptOutcome DecideOutcome(const JobRecord& job, const AttemptReport& report, 
     end.error_code = "lost";
     end.error_message = "it says that it published " + QuoteForMessage(result.revision) +
                         ", and there is no such revision";
+  } else if (report.cause != EndCause::kNone && (!result.valid || IsOfTheMachine(result))) {
+    const LostTo lost_to = WhatLostIt(report.cause);
+    end.error_code = lost_to.code;
+    end.error_message = lost_to.message;
+    if (!report.detail.empty()) end.error_message += " (" + report.detail + ")";
+    wants_memory = report.cause == EndCause::kOutOfMemory;
+    if (wants_memory && job.limits.memory_mb == 0)
+      end.error_message += "; with a limit (limits.memory_mb) the next attempt would get more";
   } else if (result.valid) {
     end.error_code = result.code;
     end.error_message = result.message;

@@ -32,8 +32,8 @@ struct AttemptOutcome {
 //                  attempt would meet again; the limit of CPU time.
 //   retry_waiting  the machine's failures: killed by a signal, out of memory, disk or descriptors,
 //                  I/O errors, the limit of wall time, another bake of the asset, gone without a
-//                  trace. With more memory next time when it ran out of it, or was killed, under a
-//                  limit.
+//                  trace, and what a farm says lost it (EndCause). With more memory next time when
+//                  it ran out of it, or was killed, under a limit.
 //   buried         the same for the max_attempts-th time.
 AttemptOutcome DecideOutcome(const JobRecord& job, const AttemptReport& report, StopReason stop,
                              const OutcomePolicy& policy, int64_t now_ms, uint64_t random,

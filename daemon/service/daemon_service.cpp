@@ -75,7 +75,7 @@ class RealService : public DaemonService {
               UniqueFd stopped)
       : parts_(parts),
         hub_(std::make_shared<EventHub>(parts.store)),
-        folders_(config.state_dir, parts.files),
+        folders_(WorkFolderOf(config), parts.files),
         started_ms_(parts.clock.WallMs()),
         wake_(std::move(wake)),
         stopped_(std::move(stopped)),
@@ -354,6 +354,7 @@ class RealService : public DaemonService {
     PATINA_ASSIGN(status.counts, parts_.store.Counts());
     std::tie(status.cores_used, status.cores) = board_.cores();
     if (status.cores == 0) status.cores = config->cores;
+    status.executor = ExecutorKindName(config->executor.kind);
     status.problems = board_.problems();
     status.pending = Pending();
     if (status.pending.size() > kMostPendingShown) status.pending.resize(kMostPendingShown);
@@ -446,6 +447,12 @@ class RealService : public DaemonService {
     }
     if (queue_paused) return "the queue is paused";
     const auto [used, budget] = board_.cores();
+    const auto config = scheduler_.config();
+    if (OnFarm(*config)) {
+      return used < budget ? "waits for its turn"
+                           : "waits for a place on the farm: " + std::to_string(used) + " of " +
+                                 std::to_string(budget) + " jobs are there";
+    }
     if (budget > 0 && used + job.limits.threads > budget) {
       return "waits for " + std::to_string(job.limits.threads) +
              (job.limits.threads == 1 ? " core: " : " cores: ") + std::to_string(used) + " of " +

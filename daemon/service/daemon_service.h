@@ -35,7 +35,8 @@ class DaemonService : public Service {
   // One round of the scheduler; see there. Only without the thread.
   virtual int Step() = 0;
 
-  // Takes no more requests and starts no more jobs; those that run have Config::stop_grace_s.
+  // Takes no more requests and starts no more jobs; those that run have Config::stop_grace_s. What
+  // is on a farm stays there.
   virtual void BeginStop() = 0;
   // No more grace: those that still run are handed back now.
   virtual void HandBackNow() = 0;

@@ -21,7 +21,7 @@ constexpr size_t kMostCurvePoints = 500;
 }  // namespace
 
 std::string JobFolders::FolderOf(int64_t id) const {
-  return state_dir_ + "/jobs/" + std::to_string(id);
+  return work_dir_ + "/jobs/" + std::to_string(id);
 }
 
 std::string JobFolders::AttemptFolder(int64_t id, int64_t attempt) const {
@@ -113,7 +113,7 @@ void JobFolders::Remove(int64_t id) { files_.RemoveTree(FolderOf(id)); }
 std::vector<int64_t> JobFolders::Existing() {
   std::vector<DirectoryEntry> entries;
   std::vector<int64_t> ids;
-  if (files_.List(state_dir_ + "/jobs", kMostFolders, &entries) != 0) return ids;
+  if (files_.List(work_dir_ + "/jobs", kMostFolders, &entries) != 0) return ids;
   for (const DirectoryEntry& entry : entries) {
     int64_t id = 0;
     const char* end = entry.name.data() + entry.name.size();

@@ -1,8 +1,8 @@
 // Where the files of jobs lie, and what the daemon itself writes there.
-//   <state>/queue.db
-//   <state>/jobs/<id>/log           output of all attempts
-//   <state>/jobs/<id>/fence         number of the current attempt
-//   <state>/jobs/<id>/a<attempt>/   job.json, events.ndjson, result.json, alive
+//   <work>/jobs/<id>/log           output of all attempts
+//   <work>/jobs/<id>/fence         number of the current attempt
+//   <work>/jobs/<id>/a<attempt>/   job.json, events.ndjson, result.json, and what the executor adds
+// <work> is WorkFolderOf(config): the state folder, or on a farm the folder that the nodes share.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ namespace patina::daemon {
 class JobFolders {
  public:
   // Both must outlive it.
-  JobFolders(std::string state_dir, FileCalls& files)
-      : state_dir_(std::move(state_dir)), files_(files) {}
+  JobFolders(std::string work_dir, FileCalls& files)
+      : work_dir_(std::move(work_dir)), files_(files) {}
 
   std::string FolderOf(int64_t id) const;
   std::string LogOf(int64_t id) const { return FolderOf(id) + "/log"; }
@@ -45,7 +45,7 @@ class JobFolders {
   std::vector<int64_t> Existing();
 
  private:
-  std::string state_dir_;
+  std::string work_dir_;
   FileCalls& files_;
 };
 

@@ -17,6 +17,7 @@ constexpr int64_t kStoreRetryMs = 1000;
 constexpr int64_t kMostStartWaitMs = 60000;
 constexpr int64_t kAdoptRetryMs = 50;
 constexpr int kCandidates = 64;
+constexpr int kStartsAtOnce = 64;  // in one step, so that much to start does not hold up the rest
 
 std::string ShortText(const Json& json, const char* key, size_t max_bytes) {
   const auto found = json.find(key);
@@ -29,6 +30,10 @@ double NumberOr(const Json& json, const char* key, double otherwise) {
   const auto found = json.find(key);
   return found != json.end() && found->is_number() ? found->get<double>() : otherwise;
 }
+
+// What may be in use at once: cores of this machine, or jobs on a farm.
+int PlacesOf(const Config& config) { return OnFarm(config) ? config.executor.jobs : config.cores; }
+int PlacesFor(int threads, const Config& config) { return OnFarm(config) ? 1 : threads; }
 
 OutcomePolicy PolicyOf(const Config& config) {
   OutcomePolicy policy;
@@ -58,7 +63,7 @@ int ThreadsOf(int wanted, const Config& config) {
 Scheduler::Scheduler(const SchedulerParts& parts, std::shared_ptr<const Config> config,
                      uint64_t random_seed)
     : parts_(parts),
-      folders_(config->state_dir, parts.files),
+      folders_(WorkFolderOf(*config), parts.files),
       random_state_(random_seed),
       config_(std::move(config)) {}
 
@@ -114,8 +119,10 @@ AttemptSpec Scheduler::SpecOf(const JobRecord& job) const {
   // A forced job bakes once; if that was published and not reported, it is found again.
   spec.skip_unchanged = !job.force || job.attempt > 1;
   if (job.force) spec.force_past = job.base_revision;
+  spec.threads = job.limits.threads;
   spec.memory_mb = job.limits.memory_mb;
   spec.cpu_s = job.limits.cpu_s;
+  spec.wall_s = job.limits.wall_s;
   return spec;
 }
 
@@ -173,7 +180,8 @@ int Scheduler::Step() {
   const int64_t now = parts_.clock.SteadyMs();
   if (!draining() && (queue_changed || start_retry_ms_ != 0) && now >= start_retry_ms_)
     StartJobs(*config);
-  parts_.board.SetCores(CoresUsed(), config->cores);
+  parts_.board.SetCores(PlacesUsed(), PlacesOf(*config));
+  parts_.board.SetProblem("executor", parts_.executor.problem());
   if (now >= next_retention_ms_) Retain();
   return NextWaitMs();
 }
@@ -264,16 +272,18 @@ void Scheduler::TakeCancels() {
 
 void Scheduler::StopWhatMust() {
   const int64_t now = parts_.clock.SteadyMs();
-  bool hand_back = false;
+  bool hand_back = false, on_farm = false;
   {
     const std::lock_guard lock(mutex_);
-    hand_back = draining_ && now >= hand_back_ms_;
+    // A farm keeps the limit itself, of the time that a job runs there.
+    on_farm = OnFarm(*config_);
+    hand_back = draining_ && now >= hand_back_ms_ && !on_farm;
   }
   for (auto& [id, active] : active_) {
     if (active.ended) continue;
     if (active.stop == StopReason::kNone) {
       const int64_t wall_ms = active.job.limits.wall_s * 1000;
-      if (wall_ms > 0 && now - active.started_steady_ms >= wall_ms) {
+      if (wall_ms > 0 && !on_farm && now - active.started_steady_ms >= wall_ms) {
         BeginStop(&active, StopReason::kWallTime);
       } else if (hand_back) {
         BeginStop(&active, StopReason::kHandBack);
@@ -445,9 +455,10 @@ void Scheduler::KeepLeases() {
   next_lease_ms_ = now + kLeaseRenewMs;
 }
 
-int Scheduler::CoresUsed() const {
+int Scheduler::PlacesUsed() const {
+  const std::shared_ptr<const Config> config = this->config();
   int used = 0;
-  for (const auto& [id, active] : active_) used += active.job.limits.threads;
+  for (const auto& [id, active] : active_) used += PlacesFor(active.job.limits.threads, *config);
   return used;
 }
 
@@ -456,8 +467,8 @@ void Scheduler::StartJobs(const Config& config) {
   auto paused = parts_.store.QueuePaused();
   if (!paused) return StoreFailed("paused", paused.error());
   if (*paused) return;
-  for (;;) {
-    const int free = config.cores - CoresUsed();
+  for (int starts = 0;;) {
+    const int free = PlacesOf(config) - PlacesUsed();
     if (free <= 0) return;
     auto candidates = parts_.store.Runnable(kCandidates);
     if (!candidates) return StoreFailed("runnable", candidates.error());
@@ -466,9 +477,10 @@ void Scheduler::StartJobs(const Config& config) {
     for (const JobRecord& job : *candidates) {
       const int threads = ThreadsOf(job.limits.threads, config);
       // Strictly in order: a large job must not wait for ever behind small ones.
-      if (threads > left) break;
+      if (PlacesFor(threads, config) > left) break;
+      if (++starts > kStartsAtOnce) return Poke();
       if (!StartJob(job, threads, config)) return;
-      left = config.cores - CoresUsed();
+      left = PlacesOf(config) - PlacesUsed();
       started = true;
     }
     if (!started || left <= 0) return;
@@ -568,7 +580,7 @@ bool Scheduler::StartJob(const JobRecord& queued, int threads, const Config& con
                                   {"asset", job.asset},
                                   {"threads", threads},
                                   {"handle", *handle}});
-  // Without a handle a later daemon finds it all the same, by its lock.
+  // Without a handle a later daemon finds it all the same, by its lock or its name.
   const Status noted = parts_.store.SetHandle({job.id, job.attempt}, *handle);
   if (!noted) StoreFailed("set_handle", noted.error());
   Active active;
@@ -618,17 +630,19 @@ int Scheduler::NextWaitMs() {
   if (start_retry_ms_ != 0) sooner(start_retry_ms_ - now);
   if (next_due_ms_) sooner(std::max<int64_t>(*next_due_ms_ - parts_.clock.WallMs(), 0));
   if (!active_.empty()) sooner(next_lease_ms_ - now);
+  bool on_farm = false;
   {
     const std::lock_guard lock(mutex_);
     const bool blocked = store_retry_ms_ != 0 || start_retry_ms_ != 0;
     if ((queue_changed_ && !blocked) || !cancels_.empty()) sooner(0);
     if (draining_ && !active_.empty() && hand_back_ms_ > now) sooner(hand_back_ms_ - now);
+    on_farm = OnFarm(*config_);
   }
   for (const auto& [id, active] : active_) {
     if (active.ended) continue;
     if (!active.known) sooner(kAdoptRetryMs);
     if (active.stop != StopReason::kNone && !active.killed) sooner(active.kill_ms - now);
-    if (active.stop == StopReason::kNone && active.job.limits.wall_s > 0)
+    if (active.stop == StopReason::kNone && active.job.limits.wall_s > 0 && !on_farm)
       sooner(active.started_steady_ms + active.job.limits.wall_s * 1000 - now);
   }
   const int executor_ms = parts_.executor.poll_timeout_ms();

@@ -52,8 +52,9 @@ class Scheduler {
   // something happens.
   int Step();
 
-  // Nothing runs and nothing waits to be written.
-  bool idle() const { return active_.empty(); }
+  // Nothing that would have to be waited for when the daemon stops: nothing runs and nothing waits
+  // to be written. What runs on a farm goes on, and the next daemon takes it over.
+  bool idle() const { return active_.empty() || OnFarm(*config()); }
 
   // Thread-safe; what they ask for is done by the next Step.
   void Poke();  // the queue has changed
@@ -61,7 +62,7 @@ class Scheduler {
   void SetConfig(std::shared_ptr<const Config> config);
   std::shared_ptr<const Config> config() const;
   // Starts no more jobs. Those that still run at hand_back_ms (Clock::SteadyMs) are ended and
-  // queued again.
+  // queued again, but for those on a farm.
   void Drain(int64_t hand_back_ms);
   bool draining() const;
 
@@ -100,7 +101,7 @@ class Scheduler {
   void PruneAsset(const std::string& out, const std::string& asset);
   void SettleFailedFile(int64_t job, bool only_missing);
   void BeginStop(Active* active, StopReason reason);
-  int CoresUsed() const;
+  int PlacesUsed() const;
   void StoreFailed(const char* what, const Error& error);
   uint64_t Random();
 
@@ -124,7 +125,7 @@ class Scheduler {
 
 Roots RootsOf(const Config& config);
 
-// The threads that a job gets: what it asks for, else the configuration's, within the budget.
+// The threads that a job gets: what it asks for, else the configuration's, within the cores.
 int ThreadsOf(int wanted, const Config& config);
 
 }  // namespace patina::daemon

@@ -40,8 +40,8 @@ struct JobView {
   JobRecord record;
   std::optional<JobProgress> progress;  // of a running job
   // Why it does not run yet, in words; empty if it runs or has ended. "waits for 1 core: 2 of 2 are
-  // in use", "paused", "the queue is paused", "another job of this asset runs",
-  // "attempt 2 is due at 2026-..."
+  // in use", "waits for a place on the farm: 100 of 100 jobs are there", "paused", "the queue is
+  // paused", "another job of this asset runs", "attempt 2 is due at 2026-..."
   std::string waiting_reason;
 };
 
@@ -146,7 +146,8 @@ struct ServiceStatus {
   std::string state;  // "running", "draining"
   std::string state_dir, out;
   bool queue_paused = false;
-  int cores = 0, cores_used = 0;
+  std::string executor = "local";  // "slurm", "command"
+  int cores = 0, cores_used = 0;   // on a farm: jobs
   JobCounts counts;
   WatchHealth watch;                  // without roots if nothing is watched
   std::vector<PendingAsset> pending;  // at most 100

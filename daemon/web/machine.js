@@ -27,7 +27,7 @@ export function machineView() {
     refresh(body,
       h("p", {class: well ? "verdict good" : "verdict bad"}, well ? "All is well." : "Something needs attention."),
       status.problems.length > 0 && h("ul", {class: "warnings"}, status.problems.map(text => h("li", {}, text))),
-      facts([["cores at work", `${status.cores_used} of ${status.cores}`], ["queue", status.queue_paused ? "paused" : status.state],
+      facts([[status.executor === "local" ? "cores at work" : "jobs on the farm", `${status.cores_used} of ${status.cores}`], ["queue", status.queue_paused ? "paused" : status.state],
         ["waiting", count((status.jobs.queued || 0) + (status.jobs.retry_waiting || 0))], ["started", moment(status.started)],
         ["version", status.version], ["process", String(status.pid)]]),
       h("section", {"aria-labelledby": "watch-title"}, h("h2", {id: "watch-title"}, "Watched folders"),

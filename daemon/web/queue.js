@@ -91,7 +91,7 @@ export function queueView(parameters) {
         ["waiting", count((jobs.queued || 0) + (jobs.retry_waiting || 0))],
         ["done", count(jobs.succeeded)],
         ["failed", count((jobs.failed || 0) + (jobs.buried || 0))],
-        ["cores at work", `${status.cores_used} of ${status.cores}`]
+        [status.executor === "local" ? "cores at work" : "jobs on the farm", `${status.cores_used} of ${status.cores}`]
       ]),
       h("p", {class: "actions aside"},
         paused && h("span", {class: "bad"}, "The queue is paused: running jobs go on, no other starts."),

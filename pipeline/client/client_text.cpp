@@ -162,7 +162,10 @@ std::string StatusText(const Json& status) {
                      ", process " + std::to_string(Integer(status, "pid")) + ", since " +
                      Text(status, "started") + "\n";
   text += "  state " + Text(status, "state_dir") + ", output " + Text(status, "out") + "\n";
-  text += "  cores " + std::to_string(Integer(status, "cores_used")) + " of " +
+  const std::string executor = Text(status, "executor");
+  const bool on_farm = !executor.empty() && executor != "local";
+  text += (on_farm ? "  farm (" + executor + "): places " : std::string("  cores ")) +
+          std::to_string(Integer(status, "cores_used")) + " of " +
           std::to_string(Integer(status, "cores")) + " in use" +
           (Flag(status, "queue_paused") ? "; the queue is paused" : "") + "\n";
   std::string counts;

@@ -77,6 +77,53 @@ TEST_F(ConfigTest, FlagsComeOverTheEnvironmentAndThatOverTheFile) {
   EXPECT_EQ(loaded.config.nice, 3);
 }
 
+TEST_F(ConfigTest, NamesAFarm) {
+  const LoadedConfig loaded = Load({{"version", 1},
+                                    {"cores", 500},
+                                    {"executor",
+                                     {{"kind", "slurm"},
+                                      {"jobs", 1000},
+                                      {"shared_dir", "shared"},
+                                      {"poll_s", 0.5},
+                                      {"partition", "p"},
+                                      {"sbatch_arguments", {"--constraint=avx2"}}}}});
+  EXPECT_EQ(Problems(loaded), "");
+  EXPECT_TRUE(loaded.warnings.empty()) << "a node may have more cores than this machine";
+  const ExecutorConfig& executor = loaded.config.executor;
+  EXPECT_TRUE(OnFarm(loaded.config));
+  EXPECT_EQ(executor.jobs, 1000);
+  EXPECT_EQ(executor.poll_s, 0.5);
+  EXPECT_EQ(WorkFolderOf(loaded.config), folder_ / "shared");
+  EXPECT_EQ(UploadFolderOf(loaded.config), folder_ / "shared/uploads");
+  // What is printed can be read again.
+  const json printed = json::parse(ConfigToJson(loaded.config));
+  const LoadedConfig again = Load(printed);
+  EXPECT_EQ(Problems(again), "");
+  EXPECT_EQ(again.config.executor.sbatch_arguments, executor.sbatch_arguments);
+  EXPECT_EQ(json::parse(ConfigToJson(again.config)), printed);
+  EXPECT_FALSE(OnFarm(Load().config));
+  EXPECT_EQ(RestartOnlyChanges(loaded.config, again.config), std::vector<std::string>());
+}
+
+TEST_F(ConfigTest, TellsWhatIsWrongWithAFarm) {
+  LoadedConfig loaded = Load({{"version", 1},
+                              {"sandbox", "require"},
+                              {"executor",
+                               {{"kind", "command"},
+                                {"partition", "p"},
+                                {"submit", {"qsub", "{script}"}},
+                                {"status", {"qstat", "{ids}"}}}}});
+  EXPECT_TRUE(Has(loaded, "/executor/partition", "is for the kind \"slurm\"")) << Problems(loaded);
+  EXPECT_TRUE(Has(loaded, "/executor/cancel", "is missing")) << Problems(loaded);
+  EXPECT_TRUE(Has(loaded, "/sandbox", "no sandbox")) << Problems(loaded);
+  EXPECT_EQ(loaded.problems.size(), 3u) << Problems(loaded);
+  loaded = Load({{"version", 1}, {"executor", {{"kind", "pbs"}, {"jobs", 0}, {"submit", "qsub"}}}});
+  for (const char* where : {"/executor/kind", "/executor/jobs", "/executor/submit"})
+    EXPECT_TRUE(Has(loaded, where, "")) << where << "\n" << Problems(loaded);
+  loaded = Load({{"version", 1}, {"executor", {{"kind", "local"}, {"shared_dir", "x"}}}});
+  EXPECT_TRUE(Has(loaded, "/executor/shared_dir", "is for farms")) << Problems(loaded);
+}
+
 TEST_F(ConfigTest, PathsOfTheFileAreRelativeToIt) {
   flags_.out.reset();
   const LoadedConfig loaded =

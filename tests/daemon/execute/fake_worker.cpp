@@ -9,6 +9,7 @@
 //   signal N    kills itself
 //   hang        until it is told to end; then says so
 //   stubborn    until it is killed
+//   wait        until somebody opens the pipe `go` in the job's folder; then all is well
 //   child       leaves a process behind that does not end by itself
 //   memory N    takes N MB, and says whether it got them
 //   cpu         uses CPU time for ever
@@ -169,6 +170,10 @@ class Worker {
       ::signal(SIGTERM, SIG_IGN);
       Event("{\"seq\":1,\"time_s\":0,\"type\":\"stage_started\",\"stage\":\"train\"}");
       for (;;) ::pause();
+    }
+    if (verb == "wait") {
+      Event("{\"seq\":1,\"time_s\":0,\"type\":\"stage_started\",\"stage\":\"train\"}");
+      std::ifstream(job_.folder + "/go").get();
     }
     if (verb == "child" && ::fork() == 0) {
       ::signal(SIGTERM, SIG_IGN);

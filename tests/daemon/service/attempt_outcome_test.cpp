@@ -56,6 +56,36 @@ TEST_F(Outcome, FailuresOfTheMachineAreTriedAgain) {
   EXPECT_EQ(Decide().end.state, JobState::kRetryWaiting);
 }
 
+TEST_F(Outcome, WhatAFarmLosesIsTriedAgain) {
+  job_.limits.memory_mb = 100;
+  for (const auto& [cause, code] :
+       std::vector<std::pair<EndCause, std::string>>{{EndCause::kNodeFailed, "node_failed"},
+                                                     {EndCause::kOutOfMemory, "out_of_memory"},
+                                                     {EndCause::kTimeLimit, "timeout"},
+                                                     {EndCause::kPreempted, "preempted"},
+                                                     {EndCause::kAskedToEnd, "interrupted"},
+                                                     {EndCause::kCancelled, "killed"},
+                                                     {EndCause::kRefused, "refused"}}) {
+    report_ = {};
+    report_.cause = cause;
+    report_.detail = "job 5 on n1";
+    // Whether or not it could still say that it was interrupted.
+    for (const bool interrupted : {false, true}) {
+      if (interrupted) Result(130, "cancelled");
+      const AttemptEnd end = Decide().end;
+      EXPECT_EQ(end.state, JobState::kRetryWaiting) << code;
+      EXPECT_EQ(end.error_code, code);
+      EXPECT_NE(end.error_message.find("(job 5 on n1)"), std::string::npos);
+      EXPECT_EQ(end.memory_mb, cause == EndCause::kOutOfMemory ? 200 : 0);
+    }
+    // Its own word counts for more.
+    Result(3, "corrupt_data");
+    EXPECT_EQ(Decide().end.state, JobState::kFailed);
+    report_.result_json = R"({"exit_code": 0, "revision": "r0001"})";
+    EXPECT_EQ(Decide().end.state, JobState::kSucceeded);
+  }
+}
+
 TEST_F(Outcome, WithoutAResultTheProcessDecides) {
   report_.signal = SIGSEGV;
   EXPECT_EQ(Decide().end.state, JobState::kRetryWaiting);

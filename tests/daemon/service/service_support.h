@@ -63,10 +63,12 @@ class FakeExecutor : public Executor {
   bool IsAlive(int64_t job, int64_t) const override { return running.count(job) != 0; }
   int poll_fd() const override { return -1; }
   int poll_timeout_ms() const override { return -1; }
+  std::string problem() const override { return trouble; }
 
   std::map<int64_t, Running> running;
   std::vector<AttemptReport> stray;
   std::optional<Error> start_error;
+  std::string trouble;
   bool adoptable = true;
   int starts = 0;
 };
