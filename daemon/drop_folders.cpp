@@ -130,6 +130,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
     if (!offers.empty()) return offers;
     std::set<std::string> claimed;
     OfferScenes(root, asset.path, offer, &claimed, &offers);
+    OfferStacks(root, asset, offer, &claimed, &offers);
     offer.job.folder = asset.path;
     if (!offers.empty() || !claimed.empty()) {
       auto unclaimed = FindSetNames(asset.path, claimed);
@@ -172,6 +173,21 @@ class WatchedFolders : public DropFolders, public AssetSource {
         }
       }
       if (above == root || above.size() <= root.size()) return;
+    }
+  }
+
+  // The layered materials with maps of a folder, named as other files are: after the way to them.
+  static void OfferStacks(const std::string& root, const ReadyAsset& asset,
+                          const AssetOffer& pattern, std::set<std::string>* claimed,
+                          std::vector<AssetOffer>* offers) {
+    for (const std::string& stack : FindMappedStacks(asset.path)) {
+      for (std::string& map : MapsOfStack(stack)) claimed->insert(std::move(map));
+      AssetOffer offer = pattern;
+      offer.job = JobOfBrdfFile(asset.path == root
+                                    ? BrdfAssetName(stack)
+                                    : AssetNameFromPath(asset.name + "_" + BrdfAssetName(stack)),
+                                stack);
+      offers->push_back(std::move(offer));
     }
   }
 

@@ -384,7 +384,8 @@ Status CheckNeuralTexture(const Manifest& manifest) {
   }
   if (!brdf.images) return Bad("/source/images", "missing in a manifest of kind \"svbrdf\"");
   const ManifestImageSet& images = *brdf.images;
-  if (images.images == 0) return Bad("/source/images/count", "no image");
+  if (images.images == 0 && brdf.source_format == "image_set")
+    return Bad("/source/images/count", "no image");
   PATINA_TRY(InRange("/source/images/width", images.width, 1, kMaxDdsSide));
   PATINA_TRY(InRange("/source/images/height", images.height, 1, kMaxDdsSide));
   PATINA_TRY(

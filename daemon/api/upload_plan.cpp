@@ -29,8 +29,13 @@ class UploadPlanner {
   }
 
   std::vector<Job> Run() {
-    // All scenes first: one may own textures of any folder.
-    for (const std::string& folder : folders_) AddScenes(folder);
+    // All scenes first: one may own textures of any folder. Layers with maps own those.
+    for (const std::string& folder : folders_) {
+      AddScenes(folder);
+      for (const std::string& stack : FindMappedStacks(folder)) {
+        for (std::string& map : MapsOfStack(stack)) claimed_.insert(std::move(map));
+      }
+    }
     for (const std::string& folder : folders_) {
       const std::vector<std::string> lists = FindImageSets(folder);
       for (const std::string& list : lists) Add(JobOfBrdfFile(BrdfAssetName(list), list), list);

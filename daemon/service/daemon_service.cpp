@@ -64,7 +64,7 @@ std::string RecipeTag(const Job& job) {
 }
 
 std::string SourceOf(const Job& job) {
-  if (job.kind != JobKind::kMaterial) return job.file;
+  if (!job.file.empty()) return job.file;
   if (!job.scene.empty()) return job.scene;
   return job.folder.empty() && !job.maps.empty() ? job.maps[0].file : job.folder;
 }

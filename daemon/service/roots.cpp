@@ -59,8 +59,7 @@ bool LiesWithin(const std::string& path, const std::vector<std::string>& folders
 
 Status ConfineJob(const Roots& roots, Job* job) {
   PATINA_TRY(Confine("/out", roots.output, "output_roots", &job->out));
-  if (job->kind != JobKind::kMaterial)
-    return Confine("/file", roots.input, "input_roots", &job->file);
+  if (!job->file.empty()) PATINA_TRY(Confine("/file", roots.input, "input_roots", &job->file));
   if (!job->folder.empty())
     PATINA_TRY(Confine("/folder", roots.input, "input_roots", &job->folder));
   if (!job->scene.empty()) PATINA_TRY(Confine("/scene", roots.input, "input_roots", &job->scene));
@@ -81,9 +80,9 @@ std::vector<std::string> InputsOf(const Job& job, const Roots& roots) {
   for (const JobMap& map : job.maps) inputs.push_back(map.file);
   // Its tables lie beside it or below.
   if (!job.ocio.empty()) inputs.push_back(fs::path(job.ocio).parent_path().string());
-  // A scene and a set of images read nothing from outside of their folders.
+  // A scene, a set of images and layers with maps read nothing from outside of their folders.
   if (!job.scene.empty()) inputs.push_back(FolderOfFile(job.scene));
-  if (job.kind == JobKind::kSvbrdf) inputs.push_back(FolderOfFile(job.file));
+  if (job.kind == JobKind::kSvbrdf && !job.file.empty()) inputs.push_back(FolderOfFile(job.file));
   if (job.folder.empty()) return inputs;
   inputs.push_back(job.folder);
   constexpr int kMostLinks = 1000;

@@ -5,6 +5,8 @@
 #include "daemon/watch/watch_core.h"
 #include "formats/base/names.h"
 #include "formats/base/sha256.h"
+#include "formats/layered/layered_file.h"
+#include "formats/layered/varying_stack.h"
 #include "pipeline/jobs/brdf_files.h"
 
 namespace patina::daemon {
@@ -21,6 +23,10 @@ constexpr int64_t kPollPauseNsPerFolder = kNsPerMs / 2;
 std::string Seconds(int64_t ns) {
   const int64_t tenths = std::max<int64_t>(0, ns) / (100 * kNsPerMs);
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " s";
+}
+
+bool IsMappedStack(const std::string& path) {
+  return layered::IsLayersFileName(path) && layered::HasStackMaps(path);
 }
 
 }  // namespace
@@ -201,8 +207,13 @@ void WatchCore::VisitQuiet(Unit* unit, int64_t now_ns) {
 }
 
 void WatchCore::Decide(Unit* unit, int64_t now_ns) {
-  unit->has_asset =
-      !unit->seen.token.empty() && (unit->file.empty() || LooksLikeBrdfFile(PathOf(*unit)));
+  const std::string path = PathOf(*unit);
+  unit->has_asset = !unit->seen.token.empty() && (unit->file.empty() || LooksLikeBrdfFile(path));
+  if (unit->has_asset && !unit->file.empty() && IsMappedStack(path)) {
+    // Layers with maps are one asset with these, that of their folder, which no event told of it.
+    unit->has_asset = false;
+    Touch(&unit->folder->images, unit->file, now_ns);
+  }
   if (!unit->has_asset) return NoteGone(unit);
   if (unit->seen.token == unit->handed_token) {
     unit->state = AssetState::kReady;
@@ -264,7 +275,9 @@ WatchCore::Look WatchCore::LookAtImages(const Folder& folder,
     manifest = manifest || entry.name == "manifest.json";
     weights = weights || entry.name == "decoder.weights";
     if (entry.kind != Entry::Kind::kFile) continue;
-    const FileRole role = RoleOfFile(entry.name);
+    FileRole role = RoleOfFile(entry.name);
+    if (role == FileRole::kBrdf && IsMappedStack(Absolute(folder.relative) + "/" + entry.name))
+      role = FileRole::kImage;
     if (role != FileRole::kImage && role != FileRole::kOther) continue;
     if (entry.is_link &&
         (role == FileRole::kOther || LeadsOut(Absolute(folder.relative) + "/" + entry.name)))

@@ -1,5 +1,6 @@
 #include "formats/layered/layered_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -8,6 +9,7 @@
 #include "formats/base/names.h"
 #include "formats/base/strict_json.h"
 #include "formats/json_view.h"
+#include "formats/layered/varying_stack.h"
 
 namespace patina::layered {
 namespace {
@@ -18,6 +20,9 @@ using OrderedJson = nlohmann::ordered_json;
 constexpr int kDeepestJson = 16;
 constexpr int kFileVersion = 1;
 constexpr double kDegrees = 180 / std::numbers::pi;
+
+// Numbers that stand where a map gives them, for the checks of all the others.
+constexpr double kAnyRoughness = 0.5, kAnyThickness = 1, kAnyCoefficient = 1;
 
 std::string Number(double value) { return OrderedJson(value).dump(); }
 
@@ -128,8 +133,8 @@ class Reader {
  public:
   explicit Reader(const Json& json) : json_(json), view_(&json, &problem_) {}
 
-  Result<Stack> Run() {
-    Complain(UnknownMember(json_, "", {"version", "layers", "base"}));
+  Result<VaryingStack> Run() {
+    Complain(UnknownMember(json_, "", {"version", "layers", "base", "normal", "address"}));
     const int version = view_.Field("version").Int(1, 1 << 20);
     if (problem_.text.empty() && version != kFileVersion) {
       Complain("/version: " + std::to_string(version) +
@@ -149,14 +154,113 @@ class Reader {
           "0.5}, a conductor, a mixture, or {\"kind\": \"black\"}");
     }
     if (base) ReadBase(base, json_["base"]);
+    ReadSurface();
     if (!problem_.text.empty()) return Fail(ErrorCode::kInvalidArgument, problem_.text);
     PATINA_TRY(CheckStack(stack_));
-    return std::move(stack_);
+    varying_.stack = std::move(stack_);
+    return std::move(varying_);
   }
 
  private:
   void Complain(const std::string& text) {
     if (problem_.text.empty()) problem_.text = text;
+  }
+
+  // What belongs to the surface as a whole.
+  void ReadSurface() {
+    if (const JsonView normal = view_.Optional("normal")) {
+      Complain(UnknownMember(json_["normal"], "/normal", {"map", "convention"}));
+      StackNormal& read = varying_.normal.emplace();
+      read.file = ReadFileName(normal, "/normal");
+      if (const JsonView convention = normal.Optional("convention")) {
+        const std::string word = convention.String();
+        read.directx = word == "directx";
+        if (word != "directx" && word != "opengl") {
+          Complain("/normal/convention: " + QuoteForMessage(word) +
+                   " is neither \"opengl\" (Y up) nor \"directx\" (Y down)");
+        }
+      }
+    }
+    const JsonView address = view_.Optional("address");
+    if (!address) return;
+    const std::string word = address.String();
+    varying_.wrap = word != "clamp";
+    if (word != "wrap" && word != "clamp")
+      Complain("/address: " + QuoteForMessage(word) + " is neither \"wrap\" nor \"clamp\"");
+    if (!varying_.varies())
+      Complain("/address: says how maps go on, and there is no map; leave it out");
+  }
+
+  std::string ReadFileName(const JsonView& object, const std::string& pointer) {
+    std::string file = object.Field("map").String();
+    if (!problem_.text.empty()) return file;
+    if (const Status plain = CheckPlainName(file, pointer + "/map:"); !plain)
+      Complain(plain.error().message + "; give the name of an image beside this file");
+    return file;
+  }
+
+  // The map in place of a value of the object at at_.
+  void ReadMap(const JsonView& view, const Json& json, const std::string& pointer,
+               StackNumber number, int axis = -1) {
+    Complain(
+        number == StackNumber::kAlbedo
+            ? UnknownMember(json, pointer, {"map", "channel", "scale", "offset", "color_space"})
+            : UnknownMember(json, pointer, {"map", "channel", "scale", "offset"}));
+    StackMap map;
+    map.pointer = pointer;
+    map.number = number;
+    map.axis = axis;
+    (in_base_ ? map.part : map.layer) =
+        static_cast<int>(in_base_ ? stack_.parts.size() : stack_.layers.size());
+    map.file = ReadFileName(view, pointer);
+    if (const JsonView channel = view.Optional("channel")) {
+      map.channel = channel.String();
+      const bool is_one = map.channel.size() == 1 &&
+                          std::string_view("rgba").find(map.channel) != std::string_view::npos;
+      if (!is_one) {
+        Complain(pointer + "/channel: " + QuoteForMessage(map.channel) +
+                 " is not one of: r, g, b, a");
+      }
+    }
+    if (const JsonView space = view.Optional("color_space")) {
+      map.color_space = space.String(255);
+      if (map.color_space.empty())
+        Complain(pointer + "/color_space: is empty; leave it out to have it found out");
+    }
+    ReadFactor(view, "scale", pointer, &map.scale);
+    ReadFactor(view, "offset", pointer, &map.offset);
+    varying_.maps.push_back(std::move(map));
+  }
+
+  void ReadFactor(const JsonView& map, const char* key, const std::string& pointer,
+                  double* factor) {
+    if (const JsonView value = map.Optional(key)) *factor = value.Number();
+    if (std::abs(*factor) <= kMaxMapFactor) return;
+    Complain(pointer + "/" + key + ": " + Number(*factor) +
+             " is beyond 1000000; choose another unit of length");
+  }
+
+  // The number under `key`, or the map in its place, for which `any` stands.
+  void ReadNumber(const JsonView& object, const Json& json, const char* key, StackNumber number,
+                  double any, double* value) {
+    const JsonView view = object.Optional(key);
+    if (!view) return;
+    if (!json[key].is_object()) {
+      *value = view.Number();
+      return;
+    }
+    ReadMap(view, json[key], Pointer(key), number);
+    *value = any;
+  }
+
+  // One number for all channels, three, or a map.
+  void ReadColour(const JsonView& object, const Json& json, const char* key, StackNumber number,
+                  double any, Rgb* rgb) {
+    const JsonView value = object.Optional(key);
+    if (!value) return;
+    if (!json[key].is_object()) return ReadRgb(object, json, key, rgb);
+    ReadMap(value, json[key], Pointer(key), number);
+    rgb->fill(any);
   }
 
   // One number for all channels, or three.
@@ -177,15 +281,27 @@ class Reader {
       if (json["roughness"].is_array()) {
         size_t axis = 0;
         double alpha[2] = {0, 0};
-        value.ForEach(2, [&](const JsonView& v) { alpha[axis++] = v.Number(); });
+        value.ForEach(2, [&](const JsonView& v) {
+          const Json& element = json["roughness"][axis];
+          if (element.is_object()) {
+            ReadMap(v, element, Pointer("roughness") + "/" + std::to_string(axis),
+                    StackNumber::kRoughness, static_cast<int>(axis));
+            alpha[axis++] = kAnyRoughness;
+          } else {
+            alpha[axis++] = v.Number();
+          }
+        });
         if (axis != 2) Complain(Pointer("roughness") + ": must be a number, or one for each axis");
         *roughness = {alpha[0], alpha[1], 0};
       } else {
-        roughness->x = roughness->y = value.Number();
+        ReadNumber(object, json, "roughness", StackNumber::kRoughness, kAnyRoughness,
+                   &roughness->x);
+        roughness->y = roughness->x;
       }
     }
-    if (const JsonView turn = object.Optional("rotation_deg"))
-      roughness->rotation_rad = turn.Number() / kDegrees;
+    double turn_deg = 0;
+    ReadNumber(object, json, "rotation_deg", StackNumber::kRotation, 0, &turn_deg);
+    roughness->rotation_rad = turn_deg / kDegrees;
   }
 
   std::string Pointer(const char* key) const { return at_ + "/" + key; }
@@ -196,16 +312,20 @@ class Reader {
                            {"ior", "roughness", "rotation_deg", "thickness", "absorption",
                             "scattering", "asymmetry"}));
     Layer layer;
-    layer.ior = object.Field("ior").Number();
+    object.Field("ior");
+    ReadNumber(object, json, "ior", StackNumber::kIor, layer.ior, &layer.ior);
     ReadRoughness(object, json, &layer.roughness);
-    if (const JsonView v = object.Optional("thickness")) layer.thickness = v.Number();
-    ReadRgb(object, json, "absorption", &layer.absorption);
-    ReadRgb(object, json, "scattering", &layer.scattering);
-    if (const JsonView v = object.Optional("asymmetry")) layer.asymmetry = v.Number();
+    ReadNumber(object, json, "thickness", StackNumber::kThickness, kAnyThickness, &layer.thickness);
+    ReadColour(object, json, "absorption", StackNumber::kAbsorption, kAnyCoefficient,
+               &layer.absorption);
+    ReadColour(object, json, "scattering", StackNumber::kScattering, kAnyCoefficient,
+               &layer.scattering);
+    ReadNumber(object, json, "asymmetry", StackNumber::kAsymmetry, 0, &layer.asymmetry);
     stack_.layers.push_back(layer);
   }
 
   void ReadBase(const JsonView& base, const Json& json) {
+    in_base_ = true;
     const std::string kind = base.Field("kind").String(64);
     if (!problem_.text.empty()) return;
     if (kind == "black") return Complain(UnknownMember(json, "/base", {"kind"}));
@@ -224,7 +344,10 @@ class Reader {
     const std::string kind = object.Field("kind").String(64);
     if (!problem_.text.empty()) return;
     BasePart part;
-    if (mixed) part.weight = object.Field("weight").Number();
+    if (mixed) {
+      object.Field("weight");
+      ReadNumber(object, json, "weight", StackNumber::kWeight, 0, &part.weight);
+    }
     if (kind == "diffuse") {
       if (mixed) {
         Complain(UnknownMember(json, at, {"kind", "weight", "albedo"}));
@@ -232,7 +355,7 @@ class Reader {
         Complain(UnknownMember(json, at, {"kind", "albedo"}));
       }
       object.Field("albedo");
-      ReadRgb(object, json, "albedo", &part.albedo);
+      ReadColour(object, json, "albedo", StackNumber::kAlbedo, part.albedo[0], &part.albedo);
     } else if (kind == "conductor") {
       part.kind = BaseKind::kConductor;
       if (mixed) {
@@ -279,7 +402,9 @@ class Reader {
   JsonProblem problem_;
   JsonView view_;
   std::string at_;  // the object that is read
+  bool in_base_ = false;
   Stack stack_;
+  VaryingStack varying_;
 };
 
 OrderedJson RgbJson(const Rgb& rgb) {
@@ -344,7 +469,7 @@ bool IsLayersFileName(std::string_view path) {
 
 Status CheckStack(const Stack& stack) { return Checker(stack).Run(); }
 
-Result<Stack> ParseStack(std::string_view text, const std::string& source_name) {
+Result<VaryingStack> ParseVaryingStack(std::string_view text, const std::string& source_name) {
   auto json = ParseStrictJson(text, kDeepestJson);
   if (!json) return Fail(json.error(), source_name);
   auto stack = Reader(*json).Run();
@@ -353,6 +478,45 @@ Result<Stack> ParseStack(std::string_view text, const std::string& source_name) 
                 source_name + ": " + stack.error().message + " (see schemas/layered.schema.json)");
   }
   return stack;
+}
+
+Result<VaryingStack> ReadVaryingStack(const std::string& path) {
+  PATINA_ASSIGN(const std::string text, ReadTextFile(path, kMaxLayersBytes));
+  return ParseVaryingStack(text, path);
+}
+
+bool HasStackMaps(const std::string& path) {
+  const auto text = ReadTextFile(path, kMaxLayersBytes);
+  if (!text) return false;
+  bool found = false;
+  // Keeps nothing but looks at the keys, as far as it is JSON.
+  const auto watch = [&](int, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::key && parsed == "map") found = true;
+    return true;
+  };
+  const Json ignored = Json::parse(*text, watch, false);
+  return found;
+}
+
+std::vector<std::string> VaryingStack::Files() const {
+  std::vector<std::string> files;
+  for (const StackMap& map : maps) files.push_back(map.file);
+  if (normal) files.push_back(normal->file);
+  std::sort(files.begin(), files.end());
+  files.erase(std::unique(files.begin(), files.end()), files.end());
+  return files;
+}
+
+Result<Stack> ParseStack(std::string_view text, const std::string& source_name) {
+  PATINA_ASSIGN(VaryingStack varying, ParseVaryingStack(text, source_name));
+  if (varying.varies()) {
+    return Fail(ErrorCode::kInvalidArgument,
+                source_name + ": " +
+                    (varying.maps.empty() ? std::string("/normal") : varying.maps[0].pointer) +
+                    ": is a map, so that the material varies over the surface; bake it as kind "
+                    "\"svbrdf\", or give a number");
+  }
+  return std::move(varying.stack);
 }
 
 Result<Stack> ReadStack(const std::string& path) {

@@ -20,7 +20,8 @@ bool IsLayersFileName(std::string_view path);
 Status CheckStack(const Stack& stack);
 
 // Errors: kInvalidArgument (not JSON, a key that is unknown or stands twice, a value of the wrong
-// type, a material that cannot be), beginning with "<source_name>: <JSON pointer>: ".
+// type, a material that cannot be, a map: see varying_stack.h), beginning with
+// "<source_name>: <JSON pointer>: ".
 Result<Stack> ParseStack(std::string_view text, const std::string& source_name);
 
 // Errors: those of ReadTextFile and of ParseStack.

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "formats/base/file_io.h"
+#include "formats/layered/layered_file.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/result_text.h"
 #include "pipeline/jobs/brdf_group.h"
@@ -32,14 +33,16 @@ void Override(const std::optional<T>& given, T* value) {
 }
 
 // Options that were given and that BRDFs do not have, for a message.
-std::string MapOptions(const JobOverrides& given) {
+std::string MapOptions(const JobOverrides& given, const Job& job) {
   std::string names;
   const auto add = [&names](bool is_given, const char* name) {
     if (is_given) names += (names.empty() ? "" : ", ") + std::string(name);
   };
   add(given.profile.has_value(), "--profile");
-  add(given.address.has_value(), "--address");
-  add(given.normal_convention.has_value(), "--normal-convention");
+  const bool set = job.kind == JobKind::kSvbrdf && job.file.empty();
+  const bool maps = set || (job.kind == JobKind::kSvbrdf && layered::IsLayersFileName(job.file));
+  add(given.address.has_value() && !set, "--address");
+  add(given.normal_convention.has_value() && !set, "--normal-convention");
   add(given.target_psnr_db.has_value(), "--target-psnr");
   add(given.target_bpp.has_value(), "--target-bpp");
   add(given.size_budget_bytes.has_value(), "--size-budget");
@@ -47,8 +50,8 @@ std::string MapOptions(const JobOverrides& given) {
   add(given.samples.has_value(), "--samples");
   add(given.min_psnr_db.has_value(), "--min-psnr");
   add(given.working_space.has_value(), "--working-space");
-  add(given.color_space.has_value(), "--color-space");
-  add(given.ocio.has_value(), "--ocio");
+  add(given.color_space.has_value() && !maps, "--color-space");
+  add(given.ocio.has_value() && !maps, "--ocio");
   add(given.repair_nonfinite, "--repair-nonfinite");
   add(given.no_toksvig, "--no-toksvig");
   add(given.learn_all, "--learn-all");
@@ -56,6 +59,20 @@ std::string MapOptions(const JobOverrides& given) {
   add(given.constant_tolerance.has_value(), "--constant-tolerance");
   add(given.lod_range.has_value(), "--lod-range");
   return names;
+}
+
+// How maps are read.
+void ApplyToMaps(const JobOverrides& overrides, Job* job) {
+  if (job->file.empty()) {
+    if (overrides.address) job->address_given = true;
+    if (overrides.address)
+      job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
+    Override(overrides.normal_convention, &job->normal_convention);
+  } else if (!layered::IsLayersFileName(job->file)) {
+    return;
+  }
+  Override(overrides.color_space, &job->color_space);
+  Override(overrides.ocio, &job->ocio);
 }
 
 void Apply(const JobOverrides& overrides, Job* job) {
@@ -66,22 +83,19 @@ void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.threads, &job->threads);
   if (overrides.no_report) job->report = false;
   if (job->kind != JobKind::kMaterial) {
-    const std::string names = MapOptions(overrides);
+    const std::string names = MapOptions(overrides, *job);
     if (!names.empty()) {
       std::fprintf(stderr, "patina: warning: %s: a BRDF has no %s; passed over\n",
                    job->asset.c_str(), names.c_str());
     }
+    if (job->kind == JobKind::kSvbrdf) ApplyToMaps(overrides, job);
     return;
   }
   if (overrides.profile) job->choose_profile = *overrides.profile == "auto";
   Override(overrides.profile, ParseProfile, &job->profile);
-  const bool aims =
-      overrides.target_psnr_db || overrides.target_bpp || overrides.size_budget_bytes;
+  const bool aims = overrides.target_psnr_db || overrides.target_bpp || overrides.size_budget_bytes;
   if (aims && !overrides.profile && job->profile == Job().profile) job->choose_profile = true;
-  if (overrides.address) job->address_given = true;
-  if (overrides.address)
-    job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
-  Override(overrides.normal_convention, &job->normal_convention);
+  ApplyToMaps(overrides, job);
   Override(overrides.target_psnr_db, &job->target_psnr_db);
   Override(overrides.target_bpp, &job->target_bpp);
   Override(overrides.size_budget_bytes, &job->size_budget_bytes);
@@ -89,8 +103,6 @@ void Apply(const JobOverrides& overrides, Job* job) {
   Override(overrides.samples, &job->samples);
   Override(overrides.min_psnr_db, &job->min_psnr_db);
   Override(overrides.working_space, ParseWorkingSpace, &job->working_space);
-  Override(overrides.color_space, &job->color_space);
-  Override(overrides.ocio, &job->ocio);
   if (overrides.repair_nonfinite) job->repair_nonfinite = true;
   if (overrides.no_toksvig) job->toksvig = false;
   for (const char* name : EffectNames()) {
@@ -147,6 +159,20 @@ bool WriteSceneManifests(const std::vector<PlannedJob>& plan, const std::vector<
   return written;
 }
 
+// Of --as svbrdf. What is reflectance already stays as it is.
+void BakeSetsAsReflectance(std::vector<PlannedJob>* plan) {
+  for (PlannedJob& planned : *plan) {
+    if (!planned.job || planned.job->kind != JobKind::kMaterial) continue;
+    if (planned.job->scene.empty()) {
+      planned.job->kind = JobKind::kSvbrdf;
+    } else {
+      planned.job = Fail(ErrorCode::kInvalidArgument,
+                         "--as svbrdf takes texture sets, and this is a material of a scene, whose "
+                         "factors and transforms it would leave out; give the folder of the maps");
+    }
+  }
+}
+
 std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
   std::vector<PlannedJob> plan;
   for (const std::string& input : options.inputs) {
@@ -172,7 +198,7 @@ std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
     for (PlannedJob& planned : plan) {
       if (!maps) planned.job = Fail(maps.error());
       if (!planned.job) continue;
-      const bool brdf = planned.job->kind != JobKind::kMaterial;
+      const bool brdf = !planned.job->file.empty();
       if (brdf || !planned.job->scene.empty()) {
         planned.job = Fail(ErrorCode::kInvalidArgument,
                            std::string("--maps describes a texture set, and this is a ") +
@@ -184,6 +210,7 @@ std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
     }
   }
   KeepChosenMaterials(options.materials, &plan);
+  if (options.as_svbrdf) BakeSetsAsReflectance(&plan);
   std::set<std::string> taken;
   for (PlannedJob& planned : plan) {
     if (!planned.job) continue;

@@ -12,6 +12,7 @@
 #include "pipeline/jobs/sample_layered.h"
 #include "pipeline/jobs/sample_scene.h"
 #include "pipeline/jobs/sample_set.h"
+#include "pipeline/jobs/sample_stack.h"
 #include "pipeline/jobs/unpack.h"
 
 namespace patina {
@@ -119,6 +120,12 @@ int SampleCommand(const CommandLine& line, const CancelToken& cancel) {
   }
   if (options.kind == "layered") {
     auto written = WriteSampleLayers(options.out);
+    if (!written) return FailCommand(written.error());
+    paths = std::move(*written);
+  }
+  if (options.kind == "svlayers") {
+    auto written = WriteSampleStack(options.out, options.size.value_or(kDefaultSampleStackSide),
+                                    options.seed);
     if (!written) return FailCommand(written.error());
     paths = std::move(*written);
   }

@@ -59,6 +59,10 @@ constexpr const char* kBakeFooter =
     "  patina bake merl/*.binary brushed.bsdf --out baked\n"
     "  patina bake layered/car_paint.layers.json --out baked --quality reference\n"
     "  patina bake cloth/cloth.btf.json --out baked    a spatially varying BRDF\n"
+    "  patina bake lacquer/lacquer.layers.json --out baked            likewise, where layers have "
+    "maps\n"
+    "  patina bake wall --out baked --as svbrdf                       reflectance of a texture "
+    "set\n"
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
     "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches "
     "it\n"
@@ -134,6 +138,12 @@ void AddBake(CLI::App* app, CommandLine* line) {
       "(default with a target or a size): the smallest that reaches the target, or the largest "
       "that fits")
       ->check(CLI::IsMember({"auto", "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}));
+  command
+      ->add_option_function<std::string>(
+          "--as", [&o](const std::string& what) { o.as_svbrdf = what == "svbrdf"; },
+          "[maps] What texture sets become: a material (default), which has their channels; or "
+          "svbrdf, the reflectance that follows from them, filtered as such")
+      ->check(CLI::IsMember({"material", "svbrdf"}));
   AddOverride(command, "--quality", &o.job.quality, "How long to train (default standard)")
       ->check(CLI::IsMember({"preview", "standard", "reference"}));
   AddOverride(command, "--target-psnr", &o.job.target_psnr_db,
@@ -390,10 +400,10 @@ void AddSample(CLI::App* app, CommandLine* line) {
       ->add_option(
           "--kind", o.kind,
           "material: maps and a job.json; brdf: BRDF files of every format, 200 MB; layered: "
-          "materials of layers to simulate; scene: a glTF scene and a scene file; btf: a bumpy "
-          "surface of two materials as a set of images; all "
-          "(default): the material, and two small BRDF files in DIR/brdf")
-      ->check(CLI::IsMember({"all", "material", "brdf", "layered", "scene", "btf"}));
+          "materials of layers to simulate; svlayers: wood under a scratched lacquer, layers with "
+          "maps; scene: a glTF scene and a scene file; btf: a bumpy surface of two materials as a "
+          "set of images; all (default): the material, and two small BRDF files in DIR/brdf")
+      ->check(CLI::IsMember({"all", "material", "brdf", "layered", "svlayers", "scene", "btf"}));
   command
       ->add_option("--images", o.images,
                    "Images of a BTF, as many lights as views (default 256, at most 22801)")
@@ -401,8 +411,8 @@ void AddSample(CLI::App* app, CommandLine* line) {
       ->type_name("N");
   command
       ->add_option("--size", o.size,
-                   "Texels a side of the maps (default 1024), of a BTF's images (default 64, at "
-                   "most 1024)")
+                   "Texels a side of the maps (default 1024, of svlayers 128), of a BTF's images "
+                   "(default 64, at most 1024)")
       ->check(CLI::Range(1, kMaxSampleSide))
       ->type_name("N");
   command
@@ -422,6 +432,8 @@ void AddSample(CLI::App* app, CommandLine* line) {
       "  patina bake brdfs --out baked\n"
       "  patina sample --kind layered --out layered\n"
       "  patina bake layered/car_paint.layers.json --out baked\n"
+      "  patina sample --kind svlayers --out lacquer\n"
+      "  patina bake lacquer --out baked\n"
       "  patina sample --kind btf --out bumps --size 128 --images 2500\n"
       "  patina bake bumps --out baked\n"
       "  patina sample --kind scene --out scene\n"

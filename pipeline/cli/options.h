@@ -47,6 +47,7 @@ struct BakeOptions {
   std::string map_list;                // --maps FILE.json, or empty
   int share = 1;                       // BRDFs on one codebook
   std::vector<std::string> materials;  // of scenes: only these; empty: all
+  bool as_svbrdf = false;              // texture sets as reflectance
   JobOverrides job;
 };
 
@@ -94,7 +95,7 @@ struct EvalOptions {
 
 struct SampleOptions {
   std::string out;
-  std::string kind = "all";  // "all", "material", "brdf", "layered", "scene", "btf"
+  std::string kind = "all";  // "all", "material", "brdf", "layered", "svlayers", ...
   std::optional<int> size;   // 1024; of a BTF 64
   int images = 256;
   uint64_t seed = 1;

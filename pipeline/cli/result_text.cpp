@@ -43,10 +43,12 @@ std::string ResultText(const JobResult& result) {
   }
   if (result.svbrdf) {
     const SvbrdfSummary& svbrdf = *result.svbrdf;
-    text += "lit planes " + Number(svbrdf.psnr_db, 2) + " dB, MAE " + Number(svbrdf.image_mae, 5) +
-            ", SSIM " + Number(svbrdf.image_ssim, 5) + ", log1p MAE " +
-            Number(svbrdf.log1p_mae, 5) + "\n  " + BytesText(static_cast<double>(result.bytes)) +
-            ", " + Number(svbrdf.ratio, 0) + " times smaller than the images as halves, ";
+    text +=
+        "lit planes " + Number(svbrdf.psnr_db, 2) + " dB, MAE " + Number(svbrdf.image_mae, 5) +
+        ", SSIM " + Number(svbrdf.image_ssim, 5) + ", log1p MAE " + Number(svbrdf.log1p_mae, 5) +
+        "\n  " + BytesText(static_cast<double>(result.bytes)) + ", " +
+        (svbrdf.ratio > 0 ? Number(svbrdf.ratio, 0) + " times smaller than the images as halves, "
+                          : "");
   }
   text += DurationText(result.seconds) + "\n  " + result.container + "\n";
   return text;

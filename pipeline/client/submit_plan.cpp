@@ -30,8 +30,8 @@ PlannedSubmit Plan(Job job, const SubmitSettings& settings) {
     if (auto space = ParseWorkingSpace(settings.working_space)) job.working_space = *space;
     if (!settings.color_space.empty()) job.color_space = settings.color_space;
     if (!settings.ocio.empty()) job.ocio = settings.ocio;
-    job.ocio = Absolute(job.ocio);
   }
+  job.ocio = Absolute(job.ocio);
   job.file = Absolute(job.file);
   job.folder = Absolute(job.folder);
   job.scene = Absolute(job.scene);

@@ -11,6 +11,7 @@
 #include "formats/brdf/sparse.h"
 #include "formats/brdf/utia.h"
 #include "formats/layered/layered_file.h"
+#include "formats/layered/varying_stack.h"
 #include "pipeline/jobs/job.h"
 #include "pipeline/svbrdf/image_set.h"
 
@@ -119,9 +120,32 @@ std::vector<std::string> FindImageSets(const std::string& folder) {
   return files;
 }
 
+std::vector<std::string> FindMappedStacks(const std::string& folder) {
+  auto files = FindBrdfFiles(folder);
+  if (!files) return {};
+  std::erase_if(*files, [](const std::string& file) {
+    return !layered::IsLayersFileName(file) || !layered::HasStackMaps(file);
+  });
+  return std::move(*files);
+}
+
+std::vector<std::string> MapsOfStack(const std::string& file) {
+  std::vector<std::string> maps;
+  const auto stack = layered::ReadVaryingStack(file);
+  if (!stack) return maps;
+  for (const std::string& name : stack->Files()) {
+    std::error_code error;
+    const fs::path map = fs::weakly_canonical(fs::path(file).parent_path() / name, error);
+    if (!error) maps.push_back(map.string());
+  }
+  return maps;
+}
+
 Job JobOfBrdfFile(const std::string& asset, const std::string& file) {
   Job job;
-  job.kind = svbrdf::IsImageSetFileName(file) ? JobKind::kSvbrdf : JobKind::kBrdf;
+  const bool varies = svbrdf::IsImageSetFileName(file) ||
+                      (layered::IsLayersFileName(file) && layered::HasStackMaps(file));
+  job.kind = varies ? JobKind::kSvbrdf : JobKind::kBrdf;
   job.asset = asset;
   job.file = file;
   return job;

@@ -25,7 +25,14 @@ std::string BrdfAssetName(const std::string& path);
 // cannot be listed.
 std::vector<std::string> FindImageSets(const std::string& folder);
 
-// The job that bakes a BRDF file or a list of images; without `out`.
+// The layered materials with maps directly in a folder, sorted; none of one that cannot be listed.
+std::vector<std::string> FindMappedStacks(const std::string& folder);
+
+// The maps that a layered material names, links resolved; none of one that cannot be read.
+std::vector<std::string> MapsOfStack(const std::string& file);
+
+// The job that bakes a BRDF file or a list of images, spatially varying if it is one or has maps;
+// without `out`.
 Job JobOfBrdfFile(const std::string& asset, const std::string& file);
 
 // The BRDF files directly in a folder, lists of images left out, sorted; hidden ones are passed

@@ -138,7 +138,9 @@ std::string BrdfText(const Manifest& m) {
   }
   text += "\nSource\n";
   for (const ManifestBrdfFile& file : brdf.files) text += "  " + file.path + "\n";
-  if (brdf.images) {
+  if (brdf.images && brdf.images->images == 0)
+    text += Format("  maps of %d x %d texels\n", brdf.images->width, brdf.images->height);
+  if (brdf.images && brdf.images->images > 0) {
     text += Format(
         "  %llu images of %d x %d; the container is %.0f times smaller than they are as "
         "halves\n",
@@ -151,7 +153,7 @@ std::string BrdfText(const Manifest& m) {
                    brdf.simulation->standard_error);
     text += "  effects: " + Joined(brdf.simulation->effects) +
             "; left out: " + Joined(brdf.simulation->left_out) + "\n";
-  } else {
+  } else if (!brdf.images) {
     text += Format("  %llu colours, %llu of them not valid\n",
                    static_cast<unsigned long long>(brdf.cells),
                    static_cast<unsigned long long>(brdf.invalid_cells));

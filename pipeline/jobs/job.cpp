@@ -8,7 +8,9 @@
 
 #include "formats/base/file_io.h"
 #include "formats/base/strict_json.h"
+#include "formats/layered/layered_file.h"
 #include "pipeline/jobs/brdf_job.h"
+#include "pipeline/jobs/job_aims.h"
 #include "pipeline/jobs/svbrdf_job.h"
 
 namespace patina {
@@ -250,11 +252,6 @@ void AssignEnum(const std::string& name, Parse parse, Enum* out) {
   if (auto value = parse(name)) *out = *value;
 }
 
-// Whether the job asks for a quality or a size that a profile can be chosen by.
-bool HasAims(const Job& job) {
-  return job.target_psnr_db > 0 || job.target_bpp > 0 || job.size_budget_bytes > 0;
-}
-
 // What is baked: a folder, a list of maps, or a material of a scene.
 void ReadSceneFields(ObjectReader* reader, Job* job) {
   const bool folder = reader->Find("folder") != nullptr, maps = reader->Find("maps") != nullptr;
@@ -297,29 +294,28 @@ void ReadEffects(ObjectReader* reader, std::vector<std::string>* problems, Job* 
   job->lod_range = {static_cast<int>(mip(0)), static_cast<int>(mip(1))};
 }
 
-// Fields of this kind that are not their defaults.
-void EffectsToJson(const Job& job, nlohmann::ordered_json* json) {
-  EffectSwitches switches = job.effects;
-  for (const char* name : EffectNames()) {
-    if (!*EffectSwitch(&switches, name)) (*json)["effects"][name] = false;
-  }
-  if (switches.constant_tolerance != kDefaultConstantTolerance)
-    (*json)["constant_tolerance"] = switches.constant_tolerance;
-  if (job.lod_range) (*json)["lod_range"] = *job.lod_range;
-}
-
-void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+// Which maps a job reads, and how; but for the scene.
+void ReadMapFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
   reader->Text("folder", false, 4096, &job->folder);
   reader->Text("set", false, 255, &job->set);
   const Json* maps = reader->Find("maps");
   if (maps != nullptr) job->maps = ReadMaps(*maps, "/maps", problems);
+  std::string address;
+  reader->Choice("address", {"wrap", "clamp"}, &address);
+  reader->Choice("normal_convention", {"auto", "opengl", "directx"}, &job->normal_convention);
+  reader->Text("color_space", false, kMaxColorSpaceName, &job->color_space);
+  reader->Text("ocio", false, 4096, &job->ocio);
+  job->address_given = !address.empty();
+  if (address == "clamp") job->address = AddressMode::kClamp;
+}
+
+void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+  ReadMapFields(reader, problems, job);
   reader->Text("scene", false, 4096, &job->scene);
   reader->Text("material", false, 255, &job->scene_material);
   ReadSceneFields(reader, job);
-  std::string profile, address;
+  std::string profile;
   reader->Choice("profile", {"auto", "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
-  reader->Choice("address", {"wrap", "clamp"}, &address);
-  reader->Choice("normal_convention", {"auto", "opengl", "directx"}, &job->normal_convention);
   reader->Number("target_psnr_db", 100, &job->target_psnr_db);
   reader->Number("target_bpp", 1024, &job->target_bpp);
   reader->Integer("size_budget_bytes", 0, kMaxSizeBudget, &job->size_budget_bytes);
@@ -330,101 +326,55 @@ void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems
   reader->Flag("toksvig", &job->toksvig);
   std::string working_space;
   reader->Choice("working_space", {"lin_rec709", "acescg"}, &working_space);
-  reader->Text("color_space", false, kMaxColorSpaceName, &job->color_space);
-  reader->Text("ocio", false, 4096, &job->ocio);
   ReadEffects(reader, problems, job);
   for (const char* key : {"file", "model"})
     reader->Refuse(key, "is a field of jobs of kind \"brdf\"; this job's kind is \"material\"");
   AssignEnum(profile, ParseProfile, &job->profile);
   job->choose_profile = profile == "auto" || (profile.empty() && HasAims(*job));
   AssignEnum(working_space, ParseWorkingSpace, &job->working_space);
-  job->address_given = !address.empty();
-  if (address == "clamp") job->address = AddressMode::kClamp;
+}
+
+// A file, or a texture set in its place.
+void ReadSvbrdfInput(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+  const bool file = reader->Find("file") != nullptr;
+  const bool set = reader->Find("folder") != nullptr || reader->Find("maps") != nullptr;
+  if (!file && !set)
+    reader->Complain("file", "is missing: give it, or \"folder\" or \"maps\" of a texture set");
+  if (!file) return ReadMapFields(reader, problems, job);
+  if (set) reader->Complain("file", "says what is read: leave out \"folder\" and \"maps\"");
+  for (const char* key : {"set", "address", "normal_convention"})
+    reader->Refuse(key, "belongs to a texture set, and this job has a \"file\"; leave it out");
+  if (layered::IsLayersFileName(job->file)) {
+    reader->Text("color_space", false, kMaxColorSpaceName, &job->color_space);
+    reader->Text("ocio", false, 4096, &job->ocio);
+    return;
+  }
+  for (const char* key : {"color_space", "ocio"})
+    reader->Refuse(key, "belongs to maps, and this job has none; leave it out");
 }
 
 void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
-  reader->Text("file", true, 4096, &job->file);
-  if (const Json* model = reader->Find("model")) job->model = ReadModel(*model, problems);
-  for (const char* key :
-       {"folder", "set", "maps", "scene", "material", "effects", "constant_tolerance", "lod_range",
-        "profile", "address", "normal_convention", "target_psnr_db", "target_bpp",
-        "size_budget_bytes", "time_budget_s", "samples",
-        "min_psnr_db", "repair_nonfinite", "toksvig", "working_space", "color_space", "ocio"}) {
-    reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"" +
-                            std::string(JobKindName(job->kind)) + "\"");
-  }
   const bool varies = job->kind == JobKind::kSvbrdf;
+  reader->Text("file", !varies, 4096, &job->file);
+  if (const Json* model = reader->Find("model")) job->model = ReadModel(*model, problems);
+  const auto refuse = [&](std::initializer_list<const char*> keys) {
+    for (const char* key : keys) {
+      reader->Refuse(key, "is a field of jobs of kind \"material\"; this job's kind is \"" +
+                              std::string(JobKindName(job->kind)) + "\"");
+    }
+  };
+  refuse({"scene", "material", "effects", "constant_tolerance", "lod_range", "profile",
+          "target_psnr_db", "target_bpp", "size_budget_bytes", "time_budget_s", "samples",
+          "min_psnr_db", "repair_nonfinite", "toksvig", "working_space"});
+  if (varies) {
+    ReadSvbrdfInput(reader, problems, job);
+  } else {
+    refuse({"folder", "set", "maps", "address", "normal_convention", "color_space", "ocio"});
+  }
   if (!varies && job->model.textures)
     reader->Complain("model", "\"textures\" belongs to jobs of kind \"svbrdf\"; leave it out");
   if (varies && job->model.index_training)
     reader->Complain("model", "\"index_training\" belongs to jobs of kind \"brdf\"; leave it out");
-}
-
-template <class T>
-void SetIf(const char* key, const std::optional<T>& value, nlohmann::ordered_json* json) {
-  if (value) (*json)["model"][key] = *value;
-}
-
-std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
-  const Job defaults;
-  json["file"] = job.file;
-  json["out"] = job.out;
-  const JobModel& model = job.model;
-  SetIf("nside", model.nside, &json);
-  SetIf("primitive_size", model.primitive_size, &json);
-  SetIf("index_bits", model.index_bits, &json);
-  SetIf("hidden", model.hidden, &json);
-  SetIf("hidden_layers", model.hidden_layers, &json);
-  SetIf("textures", model.textures, &json);
-  SetIf("interpolation", model.interpolation, &json);
-  SetIf("angle_inputs", model.angle_inputs, &json);
-  SetIf("canonical_order", model.canonical_order, &json);
-  SetIf("index_training", model.index_training, &json);
-  if (job.quality != defaults.quality) json["quality"] = QualityName(job.quality);
-  if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
-  if (job.seed != defaults.seed) json["seed"] = job.seed;
-  if (job.threads != defaults.threads) json["threads"] = job.threads;
-  if (!job.report) json["report"] = false;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-std::string CanonicalSvbrdfJob(const Job& job, nlohmann::ordered_json json) {
-  const svbrdf::SvbrdfShape shape = SvbrdfModelOfJob(job, 1, 1, AddressMode::kClamp);
-  json["model"] = {{"nside", shape.model.grid.nside},
-                   {"primitive_size", shape.model.primitive_size},
-                   {"index_bits", shape.model.index_bits},
-                   {"hidden", shape.model.hidden},
-                   {"hidden_layers", shape.model.hidden_layers},
-                   {"interpolation", InterpolationName(shape.model.grid.interpolation)},
-                   {"angle_inputs", shape.model.grid.angle_inputs},
-                   {"canonical_order", shape.model.grid.canonical_order},
-                   {"textures", shape.texture.textures}};
-  json["quality"] = QualityName(job.quality);
-  json["recipe"] = RecipeName(job.recipe);
-  json["seed"] = job.seed;
-  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
-}
-
-std::string CanonicalBrdfJob(const Job& job, nlohmann::ordered_json json) {
-  // Which of them it will be is the source's to say, whose hash stands beside this.
-  for (const brdf::SourceKind kind :
-       {brdf::SourceKind{true, false}, brdf::SourceKind{true, true}, brdf::SourceKind{false, false},
-        brdf::SourceKind{false, true}}) {
-    const brdf::ModelShape shape = ModelOfJob(job, kind);
-    json["models"].push_back({{"nside", shape.grid.nside},
-                              {"primitive_size", shape.primitive_size},
-                              {"index_bits", shape.index_bits},
-                              {"hidden", shape.hidden},
-                              {"hidden_layers", shape.hidden_layers},
-                              {"interpolation", InterpolationName(shape.grid.interpolation)},
-                              {"angle_inputs", shape.grid.angle_inputs},
-                              {"canonical_order", shape.grid.canonical_order}});
-  }
-  json["index_training"] = job.model.index_training.value_or("clusters");
-  json["quality"] = QualityName(job.quality);
-  json["recipe"] = RecipeName(job.recipe);
-  json["seed"] = job.seed;
-  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -548,94 +498,6 @@ Result<std::vector<JobMap>> ReadMapListFile(const std::string& path) {
   std::vector<JobMap> maps = ReadMaps(json, "", &problems);
   if (!problems.empty()) return FailWithProblems(path, problems);
   return maps;
-}
-
-std::string JobToJson(const Job& job) {
-  const Job defaults;
-  nlohmann::ordered_json json;
-  json["version"] = kJobVersion;
-  json["kind"] = JobKindName(job.kind);
-  json["asset"] = job.asset;
-  if (job.kind != JobKind::kMaterial) return BrdfJobToJson(job, std::move(json));
-  if (!job.folder.empty()) json["folder"] = job.folder;
-  if (!job.set.empty()) json["set"] = job.set;
-  if (!job.scene.empty()) json["scene"] = job.scene;
-  if (!job.scene_material.empty()) json["material"] = job.scene_material;
-  for (const JobMap& map : job.maps) {
-    nlohmann::ordered_json entry;
-    entry["role"] = map.role;
-    entry["file"] = map.file;
-    if (!map.channels.empty()) entry["channels"] = map.channels;
-    if (map.color_space != "auto") entry["color_space"] = map.color_space;
-    if (map.convention != "auto") entry["convention"] = map.convention;
-    if (map.invert) entry["invert"] = true;
-    json["maps"].push_back(std::move(entry));
-  }
-  json["out"] = job.out;
-  if (job.choose_profile) {
-    json["profile"] = "auto";
-  } else if (job.profile != defaults.profile || HasAims(job)) {
-    json["profile"] = ProfileName(job.profile);
-  }
-  if (job.quality != defaults.quality) json["quality"] = QualityName(job.quality);
-  if (job.recipe != defaults.recipe) json["recipe"] = RecipeName(job.recipe);
-  if (job.seed != defaults.seed) json["seed"] = job.seed;
-  if (job.threads != defaults.threads) json["threads"] = job.threads;
-  if (!job.report) json["report"] = false;
-  if (job.target_psnr_db > 0) json["target_psnr_db"] = job.target_psnr_db;
-  if (job.target_bpp > 0) json["target_bpp"] = job.target_bpp;
-  if (job.size_budget_bytes > 0) json["size_budget_bytes"] = job.size_budget_bytes;
-  if (job.time_budget_s > 0) json["time_budget_s"] = job.time_budget_s;
-  if (job.samples > 0) json["samples"] = job.samples;
-  if (job.min_psnr_db > 0) json["min_psnr_db"] = job.min_psnr_db;
-  if (job.address != defaults.address || (job.address_given && !job.scene.empty()))
-    json["address"] = AddressModeName(job.address);
-  if (job.normal_convention != defaults.normal_convention)
-    json["normal_convention"] = job.normal_convention;
-  if (job.repair_nonfinite) json["repair_nonfinite"] = true;
-  if (!job.toksvig) json["toksvig"] = false;
-  if (job.working_space != defaults.working_space)
-    json["working_space"] = WorkingSpaceName(job.working_space);
-  if (job.color_space != defaults.color_space) json["color_space"] = job.color_space;
-  if (!job.ocio.empty()) json["ocio"] = job.ocio;
-  EffectsToJson(job, &json);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-std::string CanonicalJob(const Job& job) {
-  nlohmann::ordered_json json;
-  json["version"] = kJobVersion;
-  json["kind"] = JobKindName(job.kind);
-  json["asset"] = job.asset;
-  if (job.kind == JobKind::kBrdf) return CanonicalBrdfJob(job, std::move(json));
-  if (job.kind == JobKind::kSvbrdf) return CanonicalSvbrdfJob(job, std::move(json));
-  json["maps"] = nlohmann::ordered_json::array();
-  for (const JobMap& map : job.maps) {
-    json["maps"].push_back({{"role", map.role},
-                            {"file", LastComponent(map.file)},
-                            {"channels", map.channels},
-                            {"color_space", map.color_space},
-                            {"convention", map.convention},
-                            {"invert", map.invert}});
-  }
-  json["profile"] = job.choose_profile ? "auto" : ProfileName(job.profile);
-  json["quality"] = QualityName(job.quality);
-  json["recipe"] = RecipeName(job.recipe);
-  json["seed"] = job.seed;
-  json["target_psnr_db"] = job.target_psnr_db;
-  if (job.target_bpp > 0) json["target_bpp"] = job.target_bpp;
-  if (job.size_budget_bytes > 0) json["size_budget_bytes"] = job.size_budget_bytes;
-  json["time_budget_s"] = job.time_budget_s;
-  json["samples"] = job.samples;
-  json["address"] = AddressModeName(job.address);
-  json["normal_convention"] = job.normal_convention;
-  json["repair_nonfinite"] = job.repair_nonfinite;
-  json["toksvig"] = job.toksvig;
-  if (job.working_space != WorkingSpace::kLinearRec709)
-    json["working_space"] = WorkingSpaceName(job.working_space);
-  if (job.color_space != "auto") json["color_space"] = job.color_space;
-  EffectsToJson(job, &json);
-  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
 }  // namespace patina

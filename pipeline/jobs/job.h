@@ -53,11 +53,11 @@ struct JobModel {
 enum class JobKind { kMaterial, kBrdf, kSvbrdf };  // "material", "brdf", "svbrdf"
 
 // Fields marked [material] or [brdf] belong to jobs of that kind only; those of BRDFs to spatially
-// varying ones, too.
+// varying ones, too, which may have folder, set, maps and how to read them in place of a file.
 struct Job {
   JobKind kind = JobKind::kMaterial;
   std::string asset;
-  std::string file;    // [brdf] the table or list of measurements, or the list of images
+  std::string file;    // [brdf] measurements, list of images, layers; or, if it varies, `folder`
   JobModel model;      // [brdf]
   std::string folder;  // [material] of the maps; may be empty when `maps` is not
   std::string set;    // [material] name of the one meant when `folder` holds several materials; may

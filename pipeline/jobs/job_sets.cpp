@@ -5,6 +5,8 @@
 #include <map>
 #include <set>
 
+#include "formats/layered/layered_file.h"
+#include "formats/layered/varying_stack.h"
 #include "pipeline/image/map_name.h"
 #include "pipeline/jobs/brdf_files.h"
 #include "pipeline/jobs/scene_job.h"
@@ -91,6 +93,37 @@ void DropClaimed(const std::set<std::string>& claimed, std::vector<MapSet>* sets
       return claimed.count(fs::weakly_canonical(map.path, ignored).string()) != 0;
     });
   });
+}
+
+// What the layered materials among these files read belongs to them.
+void ClaimStackMaps(const std::vector<std::string>& files, std::set<std::string>* claimed) {
+  for (const std::string& file : files) {
+    if (!layered::IsLayersFileName(file) || !layered::HasStackMaps(file)) continue;
+    for (std::string& map : MapsOfStack(file)) claimed->insert(std::move(map));
+  }
+}
+
+// Whether every image of a folder is claimed, so that there is nothing to look for sets in.
+bool HasOnlyClaimedImages(const std::string& folder, const std::set<std::string>& claimed) {
+  if (claimed.empty()) return false;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    std::error_code ignored;
+    if (HasImageExtension(entry->path().filename().string()) &&
+        claimed.count(fs::weakly_canonical(entry->path(), ignored).string()) == 0)
+      return false;
+  }
+  return !error;
+}
+
+// The sets of a folder that nobody has claimed; none where all its images are.
+Result<std::vector<MapSet>> FindUnclaimedMaps(const std::string& folder,
+                                              const std::set<std::string>& claimed) {
+  if (HasOnlyClaimedImages(folder, claimed)) return std::vector<MapSet>();
+  auto sets = FindMaps(folder);
+  if (sets) DropClaimed(claimed, &*sets);
+  return sets;
 }
 
 // Adds the materials of the scenes of a folder, and the files that belong to them.
@@ -186,16 +219,16 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
   PATINA_ASSIGN(const std::vector<std::string> brdfs, FindBrdfFiles(folder));
   std::set<std::string> claimed;
   AddScenes(folder, &found, &claimed);
-  const bool has_scenes = !found.assets.empty();
-  auto sets = FindMaps(folder);
-  if (sets) DropClaimed(claimed, &*sets);
+  ClaimStackMaps(brdfs, &claimed);
+  const bool has_owners = !found.assets.empty() || !claimed.empty();
+  auto sets = FindUnclaimedMaps(folder, claimed);
   if (sets && !sets->empty()) {
     AddSets(folder, *sets, &found);
     AddBrdfs(folder, brdfs, 0, &found);
     return found;
   }
-  // Beside a scene, images that are no sets are its textures.
-  if (!has_scenes && sets.error().code != ErrorCode::kNotFound) {
+  // Beside a scene or layers with maps, images that are no sets are theirs.
+  if (!has_owners && sets.error().code != ErrorCode::kNotFound) {
     if (brdfs.empty()) return Fail(sets.error());
     AddProblem(folder, sets.error(), &found);
     AddBrdfs(folder, brdfs, 0, &found);
@@ -210,12 +243,13 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
     auto inner_brdfs = FindBrdfFiles(subfolder);
     const std::vector<std::string> files = inner_brdfs ? *inner_brdfs : std::vector<std::string>();
     AddScenes(subfolder, &found, &claimed);
-    const bool inner_scenes = found.assets.size() > first;
-    auto inner = FindMaps(subfolder);
+    const size_t claims = claimed.size();
+    ClaimStackMaps(files, &claimed);
+    const bool inner_owners = found.assets.size() > first || claimed.size() > claims;
+    auto inner = FindUnclaimedMaps(subfolder, claimed);
     if (inner) {
-      DropClaimed(claimed, &*inner);
       AddSets(subfolder, *inner, &found);
-    } else if (!inner_scenes) {
+    } else if (!inner_owners) {
       auto listed = ListFolder(subfolder);
       const bool no_images = listed && !listed->has_images;
       if (no_images && files.empty()) {

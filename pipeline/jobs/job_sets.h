@@ -53,9 +53,9 @@ struct FoundAssets {
 // FindBrdfFiles); and those of its direct subfolders when it holds no maps of its own. Files that a
 // scene refers to belong to it, and a set that has one of them is not listed. A BRDF's asset is
 // named by its file without extension, or with it where that would give two assets of the folder
-// one name. A folder with lists of images (FindImageSets) stands for these alone. A folder that has
-// images but no usable set is listed with its problem, so that it does
-// not hide the others. Hidden subfolders and `except` (the output folder) are passed over. Errors:
+// one name. Maps that a layered material names belong to it, likewise. A folder with lists of
+// images (FindImageSets) stands for these alone. A folder that has images but no usable set is
+// listed with its problem, so that it does not hide the others. Hidden subfolders and `except` (the output folder) are passed over. Errors:
 // kNotFound (no such folder, or nothing in it or its subfolders), kInvalidArgument (not a folder),
 // kIo, and those of FindMaps when the folder itself holds maps and no BRDF file.
 Result<FoundAssets> FindAssets(const std::string& folder, const std::string& except);

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
-#include <set>
 
 #include "pipeline/base/rng.h"
 #include "pipeline/color/color.h"
@@ -20,23 +18,6 @@ constexpr uint64_t kTexelSeed = 20231;
 
 double Degrees(const brdf::Direction& d) {
   return std::acos(std::clamp(static_cast<double>(d.z), -1.0, 1.0)) * 180 / std::numbers::pi;
-}
-
-// The images that are shown: see SvbrdfMeasurement::planes.
-std::vector<size_t> PickPlanes(const svbrdf::ImageSet& set) {
-  std::vector<size_t> order(set.images.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  const auto height = [&](size_t i) {
-    return std::min(set.images[i].light.z, set.images[i].view.z);
-  };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return height(a) > height(b); });
-  std::vector<size_t> picked;
-  for (const size_t at : {size_t{0}, order.size() / 2, order.size() - 1}) {
-    if (std::find(picked.begin(), picked.end(), order[at]) == picked.end())
-      picked.push_back(order[at]);
-  }
-  return picked;
 }
 
 RgbImage Picture(const brdf::SphereImage& image) {
@@ -56,25 +37,30 @@ RgbImage Picture(const brdf::SphereImage& image) {
 
 class Meter {
  public:
-  Meter(const svbrdf::ImageSet& set, const SvbrdfDecoder& decoder, ThreadPool& pool)
-      : set_(set), decoder_(decoder), pool_(pool) {}
+  Meter(const svbrdf::VaryingSource& source, const SvbrdfDecoder& decoder, ThreadPool& pool)
+      : source_(source), decoder_(decoder), pool_(pool) {}
 
   bool finite() const { return finite_; }
 
-  Result<SvbrdfPlane> Plane(size_t image) {
-    PATINA_ASSIGN(const PlaneLevel source, svbrdf::ReadSetImage(set_, image));
-    const svbrdf::SetImage& entry = set_.images[image];
+  Result<SvbrdfPlane> Plane(size_t pair) {
+    const svbrdf::DirectionPair& entry = source_.pairs()[pair];
     SvbrdfPlane plane;
-    plane.image = image;
+    plane.image = pair;
     plane.light_deg = Degrees(entry.light);
     plane.view_deg = Degrees(entry.view);
-    const int side = std::min({set_.width, set_.height, kPlaneSide});
-    const int x0 = (set_.width - side) / 2, y0 = (set_.height - side) / 2;
+    const int width = source_.width(), height = source_.height();
+    const int side = std::min({width, height, kPlaneSide, source_.plane_side()});
+    const int x0 = (width - side) / 2, y0 = (height - side) / 2;
+    std::vector<svbrdf::TexelPlace> places;
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) places.push_back({x0 + x, y0 + y});
+    }
+    PATINA_ASSIGN(const std::vector<float> given, source_.Values(pair, places, pool_));
     brdf::SphereImage wanted, decoded;
     for (brdf::SphereImage* to : {&wanted, &decoded}) {
       to->side = side;
-      to->rgb.resize(3 * static_cast<size_t>(side) * side);
-      to->inside.assign(static_cast<size_t>(side) * side, 1);
+      to->rgb.resize(3 * places.size());
+      to->inside.assign(places.size(), 1);
     }
     const float exposure = entry.light.z * std::numbers::pi_v<float>;
     pool_.ParallelFor(side, [&](int y, int) {
@@ -83,7 +69,7 @@ class Meter {
         Decode(entry, x0 + x, y0 + y, decoded.rgb.data() + at);
         for (int c = 0; c < 3; ++c) {
           decoded.rgb[at + c] *= exposure;
-          wanted.rgb[at + c] = std::max(0.0f, source.Row(c, y0 + y)[x0 + x]) * exposure;
+          wanted.rgb[at + c] = std::max(0.0f, given[at + c]) * exposure;
         }
       }
     });
@@ -96,18 +82,22 @@ class Meter {
     return plane;
   }
 
-  // Adds |log(1 + f) - log(1 + f*)| of texels of an image.
-  Status AddTexels(size_t image, Log1pError* sum) {
-    PATINA_ASSIGN(const PlaneLevel source, svbrdf::ReadSetImage(set_, image));
-    Rng rng(kTexelSeed, image);
+  // Adds |log(1 + f) - log(1 + f*)| of texels under a pair.
+  Status AddTexels(size_t pair, Log1pError* sum) {
+    Rng rng(kTexelSeed, pair);
+    std::vector<svbrdf::TexelPlace> places;
     for (int i = 0; i < kTexelsOfEach; ++i) {
-      const int x = static_cast<int>(rng.Below(static_cast<uint32_t>(set_.width)));
-      const int y = static_cast<int>(rng.Below(static_cast<uint32_t>(set_.height)));
+      const int x = static_cast<int>(rng.Below(static_cast<uint32_t>(source_.width())));
+      const int y = static_cast<int>(rng.Below(static_cast<uint32_t>(source_.height())));
+      places.push_back({x, y});
+    }
+    PATINA_ASSIGN(const std::vector<float> given, source_.Values(pair, places, pool_));
+    for (size_t i = 0; i < places.size(); ++i) {
       float rgb[3];
-      Decode(set_.images[image], x, y, rgb);
-      for (int c = 0; c < 3; ++c) {
+      Decode(source_.pairs()[pair], places[i].x, places[i].y, rgb);
+      for (size_t c = 0; c < 3; ++c) {
         finite_ = finite_ && std::isfinite(rgb[c]);
-        const double wanted = std::max(0.0, static_cast<double>(source.Row(c, y)[x]));
+        const double wanted = std::max(0.0, static_cast<double>(given[3 * i + c]));
         const double d = std::log1p(static_cast<double>(rgb[c])) - std::log1p(wanted);
         sum->mae += std::abs(d);
         sum->mse += d * d;
@@ -118,13 +108,13 @@ class Meter {
   }
 
  private:
-  void Decode(const svbrdf::SetImage& entry, int x, int y, float rgb[3]) const {
+  void Decode(const svbrdf::DirectionPair& entry, int x, int y, float rgb[3]) const {
     const float wi[3] = {entry.light.x, entry.light.y, entry.light.z};
     const float wo[3] = {entry.view.x, entry.view.y, entry.view.z};
-    decoder_.Evaluate(wi, wo, (x + 0.5) / set_.width, (y + 0.5) / set_.height, 0, rgb);
+    decoder_.Evaluate(wi, wo, (x + 0.5) / source_.width(), (y + 0.5) / source_.height(), 0, rgb);
   }
 
-  const svbrdf::ImageSet& set_;
+  const svbrdf::VaryingSource& source_;
   const SvbrdfDecoder& decoder_;
   ThreadPool& pool_;
   bool finite_ = true;
@@ -150,21 +140,21 @@ void Summarize(SvbrdfMeasurement* result) {
 
 }  // namespace
 
-Result<SvbrdfMeasurement> MeasureSvbrdf(const std::string& directory, const svbrdf::ImageSet& set,
-                                        ThreadPool& pool, const CancelToken& cancel,
-                                        ProgressSink& progress) {
+Result<SvbrdfMeasurement> MeasureSvbrdf(const std::string& directory,
+                                        const svbrdf::VaryingSource& source, ThreadPool& pool,
+                                        const CancelToken& cancel, ProgressSink& progress) {
   PATINA_ASSIGN(const SvbrdfDecoder decoder, LoadSvbrdfDecoder(directory));
-  Meter meter(set, decoder, pool);
+  Meter meter(source, decoder, pool);
   SvbrdfMeasurement result;
-  for (const size_t image : PickPlanes(set)) {
+  for (const size_t image : source.planes()) {
     if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
     PATINA_ASSIGN(SvbrdfPlane plane, meter.Plane(image));
     result.planes.push_back(std::move(plane));
   }
-  const size_t images = std::min(kTexelImages, set.images.size());
+  const size_t images = std::min(kTexelImages, source.pairs().size());
   for (size_t i = 0; i < images; ++i) {
     if (cancel.cancelled()) return Fail(ErrorCode::kCancelled, "interrupted");
-    PATINA_TRY(meter.AddTexels(i * set.images.size() / images, &result.log1p));
+    PATINA_TRY(meter.AddTexels(i * source.pairs().size() / images, &result.log1p));
     ProgressEvent event;
     event.stage = "verify";
     event.fraction = static_cast<double>(i + 1) / static_cast<double>(images);

@@ -1,4 +1,4 @@
-// Measures a written spatially varying BRDF against the images that it was made from, with the
+// Measures a written spatially varying BRDF against the source that it was made from, with the
 // decoder that renderers use.
 #pragma once
 
@@ -14,14 +14,15 @@
 #include "pipeline/jobs/job_result.h"
 #include "pipeline/jobs/measure_brdf.h"
 #include "pipeline/jobs/sheet.h"
-#include "pipeline/svbrdf/image_set.h"
+#include "pipeline/svbrdf/varying_source.h"
 
 namespace patina {
 
-// The plane as one of the images shows it, under a light of which a white diffuse surface that
-// faces it has the value 1: f cos(theta) pi. The middle square, at most kPlaneSide a side.
+// The plane under one of the source's pairs, as one of its images shows it, under a light of which
+// a white diffuse surface that faces it has the value 1: f cos(theta) pi. The middle square, at
+// most kPlaneSide a side.
 struct SvbrdfPlane {
-  size_t image = 0;                    // of the set
+  size_t image = 0;                    // pair of the source
   double light_deg = 0, view_deg = 0;  // from the normal
   brdf::ImageError error;
   double mse = 0;                                                // of linear values within [0, 1]
@@ -31,19 +32,17 @@ struct SvbrdfPlane {
 inline constexpr int kPlaneSide = 512;
 
 struct SvbrdfMeasurement {
-  // The images whose steeper direction is the nearest to the normal, the median, and the farthest;
-  // fewer of sets that have fewer.
-  std::vector<SvbrdfPlane> planes;
-  brdf::ImageError error;  // means over the planes
+  std::vector<SvbrdfPlane> planes;  // VaryingSource::planes
+  brdf::ImageError error;           // means over the planes
   double mse = 0;
   Log1pError log1p;  // of 256 texels each of up to 64 images
 };
 
-// Deterministic. Errors: those of LoadSvbrdfDecoder and ReadSetImage; kInternal for a decoded value
-// that is not finite; kCancelled.
-Result<SvbrdfMeasurement> MeasureSvbrdf(const std::string& directory, const svbrdf::ImageSet& set,
-                                        ThreadPool& pool, const CancelToken& cancel,
-                                        ProgressSink& progress);
+// Deterministic. Errors: those of LoadSvbrdfDecoder and VaryingSource::Values; kInternal for a
+// decoded value that is not finite; kCancelled.
+Result<SvbrdfMeasurement> MeasureSvbrdf(const std::string& directory,
+                                        const svbrdf::VaryingSource& source, ThreadPool& pool,
+                                        const CancelToken& cancel, ProgressSink& progress);
 
 SvbrdfSummary SummarizeSvbrdf(const SvbrdfMeasurement& measurement, const ManifestBrdf& brdf,
                               uint64_t bytes);

@@ -1,5 +1,5 @@
-#include "pipeline/jobs/package.h"
 #include "formats/model_bytes.h"
+#include "pipeline/jobs/package.h"
 #include "pipeline/jobs/page_parts.h"
 #include "pipeline/jobs/page_time.h"
 #include "pipeline/jobs/report_page.h"
@@ -19,7 +19,13 @@ double Ratio(const PageFacts& facts) {
   return CompressionRatio(*facts.manifest.brdf, ModelBytes(facts.manifest.payloads));
 }
 
+bool IsMeasured(const PageFacts& facts) { return facts.manifest.brdf->images->images > 0; }
+
 std::string SizeText(const ManifestImageSet& images) {
+  if (images.images == 0) {
+    return "maps of " + std::to_string(images.width) + " " + kTimes + " " +
+           std::to_string(images.height);
+  }
   return std::to_string(images.images) + " images of " + std::to_string(images.width) + " " +
          kTimes + " " + std::to_string(images.height);
 }
@@ -29,12 +35,22 @@ std::string Angles(const SvbrdfPlane& plane) {
          ShortText(plane.view_deg, 3) + kDegree;
 }
 
+std::string Listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "none" : text;
+}
+
 std::string Verdict(const PageFacts& facts, const SvbrdfMeasurement& measurement) {
-  return "Planes lit as in the images come to " + FixedText(PsnrOfMse(measurement.mse), 2) +
-         " dB and an SSIM of " + FixedText(measurement.error.ssim, 4) + ". " +
-         BytesText(ModelBytes(facts.manifest.payloads)) + " to load, " + CountText(Ratio(facts)) +
-         " times less than the images as half floats. Baked in " + SecondsText(facts.run.seconds) +
-         "; the training stopped because " + StopText(facts.stopped_by) + ".";
+  const bool measured = IsMeasured(facts);
+  return std::string(measured ? "Planes lit as in the images" : "Lit planes") + " come to " +
+         FixedText(PsnrOfMse(measurement.mse), 2) + " dB and an SSIM of " +
+         FixedText(measurement.error.ssim, 4) + ". " +
+         BytesText(ModelBytes(facts.manifest.payloads)) + " to load" +
+         (measured ? ", " + CountText(Ratio(facts)) + " times less than the images as half floats"
+                   : "") +
+         ". Baked in " + SecondsText(facts.run.seconds) + "; the training stopped because " +
+         StopText(facts.stopped_by) + ".";
 }
 
 std::string KindLine(const Manifest& m) {
@@ -44,16 +60,19 @@ std::string KindLine(const Manifest& m) {
          std::to_string(m.tool.recipe_version) + kMiddleDot + "seed " + std::to_string(m.seed);
 }
 
-void AddPlanes(const SvbrdfMeasurement& measurement, const std::vector<PageTrio>& planes,
-               Html* html) {
+void AddPlanes(const PageFacts& facts, const SvbrdfMeasurement& measurement,
+               const std::vector<PageTrio>& planes, Html* html) {
   OpenSection("pictures", "The lit plane", html);
-  html->Add("p",
-            "Light and view of three of the source's images: those whose steeper direction is "
-            "nearest to the normal, in the middle, and farthest. A white diffuse surface that "
-            "faces the light would be white. Point at a decoded picture, or move to it with the "
-            "Tab key, and the source lies in its place. The difference is the largest of the "
-            "channels, times " +
-                ShortText(kSheetDifferenceGain, 3) + ": black is no difference.");
+  html->Add(
+      "p", std::string(IsMeasured(facts) ? "Light and view of three of the source's images: those "
+                                           "whose steeper direction is nearest to "
+                                           "the normal, in the middle, and farthest"
+                                         : "Three of 64 pairs of light and view") +
+               ". A white diffuse surface that "
+               "faces the light would be white. Point at a decoded picture, or move to it with the "
+               "Tab key, and the source lies in its place. The difference is the largest of the "
+               "channels, times " +
+               ShortText(kSheetDifferenceGain, 3) + ": black is no difference.");
   for (size_t i = 0; i < planes.size(); ++i) {
     html->Open("div", {{"class", "spheres"}});
     AddTrio(planes[i], Angles(measurement.planes[i]), false, html);
@@ -85,7 +104,8 @@ void AddErrors(const SvbrdfMeasurement& measurement, Html* html) {
   AddTable(table, html);
   html->Add("p", "Mean error of log(1 + f) over " +
                      CountText(static_cast<double>(measurement.log1p.pairs)) +
-                     " texels of up to 64 images: " + ShortText(measurement.log1p.mae, 3) + ".");
+                     " texels under up to 64 pairs of light and view: " +
+                     ShortText(measurement.log1p.mae, 3) + ".");
   html->Close();
 }
 
@@ -96,9 +116,19 @@ void AddModel(const PageFacts& facts, const svbrdf::TrainedSvbrdf& model, Html* 
   std::string layers;
   for (const int width : brdf.layers)
     layers += (layers.empty() ? "" : " \xE2\x86\x92 ") + std::to_string(width);
-  AddTrainingFacts(
-      {{"file", brdf.files[0].path},
-       {"neural texture",
+  std::vector<std::pair<std::string, std::string>> rows = {{"file", brdf.files[0].path}};
+  if (brdf.simulation) {
+    rows.emplace_back("simulated", CountText(static_cast<double>(brdf.simulation->paths)) +
+                                       " paths for " +
+                                       CountText(static_cast<double>(brdf.simulation->pairs)) +
+                                       " places and pairs of directions, standard error " +
+                                       ShortText(brdf.simulation->standard_error, 3));
+    rows.emplace_back("effects", Listed(brdf.simulation->effects));
+    rows.emplace_back("left out", Listed(brdf.simulation->left_out));
+  }
+  rows.insert(
+      rows.end(),
+      {{"neural texture",
         std::to_string(texture.textures) + " BC6H textures of " + std::to_string(texture.width) +
             " " + kTimes + " " + std::to_string(texture.height) + ", " +
             std::to_string(texture.levels) + " mips, " + AddressModeName(texture.address)},
@@ -109,8 +139,8 @@ void AddModel(const PageFacts& facts, const svbrdf::TrainedSvbrdf& model, Html* 
        {"error of log(1 + f cos) of free features and texels", ShortText(model.free_loss, 3)},
        {"the same of codes and blocks", ShortText(model.block_loss, 3)},
        {"the same at the end, behind legal blocks", ShortText(model.final_loss, 3)},
-       {"steps left out because a value was not finite", std::to_string(model.rollbacks)}},
-      html);
+       {"steps left out because a value was not finite", std::to_string(model.rollbacks)}});
+  AddTrainingFacts(rows, html);
   html->Close();
 }
 
@@ -120,23 +150,27 @@ std::string SvbrdfReportPage(const PageFacts& facts, const SvbrdfMeasurement& me
                              const svbrdf::TrainedSvbrdf& model,
                              const std::vector<PageTrio>& planes) {
   const uint64_t cells = facts.manifest.brdf->cells;
-  Html html = BeginReportPage(
-      facts, KindLine(facts.manifest), Verdict(facts, measurement),
-      {{FixedText(PsnrOfMse(measurement.mse), 2) + " dB", "of the lit planes"},
-       {FixedText(measurement.error.ssim, 4), "SSIM of the lit planes (1 is perfect)"},
-       {ShortText(measurement.log1p.mae, 3), "mean error of log(1 + f)"},
-       {BytesText(ModelBytes(facts.manifest.payloads)), "to load"},
-       {CountText(Ratio(facts)), "times smaller than the images"},
-       {SecondsText(facts.run.seconds), "to bake"}});
+  std::vector<HeadFact> figures = {
+      {FixedText(PsnrOfMse(measurement.mse), 2) + " dB", "of the lit planes"},
+      {FixedText(measurement.error.ssim, 4), "SSIM of the lit planes (1 is perfect)"},
+      {ShortText(measurement.log1p.mae, 3), "mean error of log(1 + f)"},
+      {BytesText(ModelBytes(facts.manifest.payloads)), "to load"}};
+  if (IsMeasured(facts))
+    figures.push_back({CountText(Ratio(facts)), "times smaller than the images"});
+  figures.push_back({SecondsText(facts.run.seconds), "to bake"});
+  Html html = BeginReportPage(facts, KindLine(facts.manifest), Verdict(facts, measurement),
+                              std::move(figures));
   AddWarnings(facts, &html);
-  AddPlanes(measurement, planes, &html);
+  AddPlanes(facts, measurement, planes, &html);
   AddTimeSection(facts, &html);
   AddErrors(measurement, &html);
-  AddBytesSection(facts,
-                  {{"the images as half floats", 6 * cells}, {"the images as floats", 12 * cells}},
-                  "Against the images that it was made from: three numbers a texel, without "
-                  "headers.",
-                  &html);
+  if (IsMeasured(facts)) {
+    AddBytesSection(
+        facts, {{"the images as half floats", 6 * cells}, {"the images as floats", 12 * cells}},
+        "Against the images that it was made from: three numbers a texel, without "
+        "headers.",
+        &html);
+  }
   AddModel(facts, model, &html);
   return FinishReportPage(facts, std::move(html));
 }

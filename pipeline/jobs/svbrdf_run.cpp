@@ -1,7 +1,6 @@
 #include "pipeline/jobs/svbrdf_run.h"
 
 #include <cstdio>
-#include <filesystem>
 #include <optional>
 
 #include "formats/base/file_io.h"
@@ -38,25 +37,26 @@ class SvbrdfRun : public StagedRun {
     reading_input_ = true;
     {
       ThreadPool pool(job_.threads);
-      PATINA_ASSIGN(source_, ReadSvbrdfSource(job_, pool, cancel_));
+      PATINA_ASSIGN(source_, ReadSvbrdfSource(job_, pool, cancel_, sink_));
     }
     result_.fingerprint = source_.fingerprint;
-    const svbrdf::ImageSet& set = source_.set;
-    observer_.OnNote("found", std::filesystem::path(job_.file).filename().string() + ": " +
-                                  std::to_string(set.images.size()) + " images of " +
-                                  std::to_string(set.width) + " x " + std::to_string(set.height));
+    observer_.OnNote("found", source_.found);
+    for (const std::string& warning : source_.warnings) sink_.OnWarning(warning);
     reading_input_ = false;
     unchanged_ = FoundUnchanged();
     if (unchanged_) return {};
     PATINA_TRY(OpenStaging());
-    shape_ = SvbrdfModelOfJob(job_, set.width, set.height, set.address);
+    const svbrdf::VaryingSource& texels = *source_.texels;
+    shape_ = SvbrdfModelOfJob(job_, texels.width(), texels.height(), texels.address(),
+                              texels.isotropic());
     options_ =
-        SvbrdfTrainingOfJob(job_, uint64_t{set.images.size()} * static_cast<uint64_t>(set.width) *
-                                      static_cast<uint64_t>(set.height));
+        SvbrdfTrainingOfJob(job_, texels.pairs().size() * static_cast<uint64_t>(texels.width()) *
+                                      static_cast<uint64_t>(texels.height()));
     options_.cancel = &cancel_;
     svbrdf::TexelPoolOptions drawing;
-    drawing.count = WantedSamples(options_, shape_.texture, set.images.size());
+    drawing.count = WantedSamples(options_, shape_.texture, texels);
     drawing.levels = shape_.texture.levels;
+    drawing.features = shape_.texture.features();
     drawing.grid = shape_.model.grid;
     drawing.seed = job_.seed;
     drawing.cancel = &cancel_;
@@ -70,22 +70,24 @@ class SvbrdfRun : public StagedRun {
     // Images are decoded several at a time, each by one thread.
     SetImageIoThreads(1);
     reading_input_ = true;
-    PATINA_ASSIGN(texels_, svbrdf::DrawTexels(set, drawing, *pool_));
-    // Who copies a set while it is read must not get a container under a wrong name.
-    PATINA_ASSIGN(const SvbrdfSource after, ReadSvbrdfSource(job_, *pool_, cancel_));
-    if (after.fingerprint != source_.fingerprint) {
-      return Fail(ErrorCode::kConflict,
-                  job_.file +
-                      ": it or its images changed while they were read; bake again when "
-                      "the set is complete");
-    }
+    PATINA_ASSIGN(texels_, texels.Draw(drawing, *pool_));
+    PATINA_TRY(CheckUnchanged(source_, *pool_, cancel_));
     reading_input_ = false;
+    cost_ = texels_.cost;
+    if (source_.simulated) {
+      char text[128];
+      std::snprintf(text, sizeof text,
+                    "%.1f M paths for %.0f k places and pairs of directions, standard error %.4f",
+                    1e-6 * static_cast<double>(cost_.paths),
+                    1e-3 * static_cast<double>(cost_.pairs), cost_.standard_error);
+      observer_.OnNote("simulated", text);
+    }
     return {};
   }
 
   Status Train() {
     auto trained = svbrdf::TrainSvbrdf(texels_, shape_, options_, *pool_, sink_);
-    if (!trained) return Fail(trained.error(), job_.file);
+    if (!trained) return Fail(trained.error(), job_.asset);
     model_ = std::move(*trained);
     texels_ = svbrdf::TexelPool();
     result_.samples = model_.samples;
@@ -97,7 +99,7 @@ class SvbrdfRun : public StagedRun {
 
   Status Package() {
     PATINA_TRY(AddSvbrdfModel(model_, &*staging_));
-    manifest_ = DescribeSvbrdf(job_, source_, shape_);
+    manifest_ = DescribeSvbrdf(job_, source_, shape_, cost_);
     manifest_.brdf->rollbacks = model_.rollbacks;
     result_.bytes = ModelBytes(staging_->payloads());
     // So that the decoder can open what was written.
@@ -107,7 +109,7 @@ class SvbrdfRun : public StagedRun {
   Status Verify() {
     PATINA_TRY(VerifyPayloads({staging_->directory(), WithPayloads()}));
     PATINA_ASSIGN(measurement_,
-                  MeasureSvbrdf(staging_->directory(), source_.set, *pool_, cancel_, sink_));
+                  MeasureSvbrdf(staging_->directory(), *source_.texels, *pool_, cancel_, sink_));
     DescribeSvbrdfQuality(measurement_, &*manifest_.brdf);
     result_.svbrdf = SummarizeSvbrdf(measurement_, *manifest_.brdf, result_.bytes);
     return {};
@@ -152,6 +154,7 @@ class SvbrdfRun : public StagedRun {
   svbrdf::SvbrdfShape shape_;
   svbrdf::SvbrdfOptions options_;
   svbrdf::TexelPool texels_;
+  brdf::SimulationCost cost_;
   svbrdf::TrainedSvbrdf model_;
   SvbrdfMeasurement measurement_;
 };

@@ -1,4 +1,5 @@
-// Jobs of kind "svbrdf": from a set of measured images to a published container.
+// Jobs of kind "svbrdf": from measured images, a layered material with maps or a texture set to a
+// published container.
 #pragma once
 
 #include "pipeline/base/progress.h"
@@ -9,8 +10,8 @@
 
 namespace patina {
 
-// Stages: ingest (read the list, hash and read the images), train, package, verify (decode the
-// written bytes and measure them), report, publish.
+// Stages: ingest (read and hash the source, draw samples from it), train, package, verify (decode
+// the written bytes and measure them), report, publish.
 JobResult RunSvbrdfJob(const Job& job, JobObserver& observer, const CancelToken& cancel,
                        const RunGuards& guards);
 

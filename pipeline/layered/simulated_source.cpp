@@ -18,13 +18,11 @@ constexpr int kTrialWalks = 64;
 // Squared errors are summed as integers: their order, which threads decide, must not count.
 constexpr double kErrorUnit = 1e-9;
 
-struct Trial {
-  double events = 0;                   // of a walk, mean
-  double mirrored = 0, scattered = 0;  // shares of light that leave, over all angles
-};
+}  // namespace
 
-Trial TryOut(const Simulator& simulator) {
-  Trial trial;
+Result<Outlook> LookAhead(const Simulator& simulator) {
+  Outlook trial;
+  double scattered = 0;
   Rng rng(1);
   for (int angle = 0; angle < kTrialAngles; ++angle) {
     const double z = (angle + 0.5) / kTrialAngles;
@@ -33,31 +31,68 @@ Trial TryOut(const Simulator& simulator) {
       const Exit exit = simulator.Walk(w, &rng);
       trial.events += exit.events;
       const double share = std::max({exit.weight[0], exit.weight[1], exit.weight[2]});
-      (exit.smooth ? trial.mirrored : trial.scattered) += share;
+      (exit.smooth ? trial.mirrored : scattered) += share;
     }
   }
   constexpr double kCount = kTrialAngles * kTrialWalks;
-  return {trial.events / kCount, trial.mirrored / kCount, trial.scattered / kCount};
+  trial.events /= kCount;
+  trial.mirrored /= kCount;
+  if (scattered > 0) return trial;
+  return Fail(ErrorCode::kInvalidArgument,
+              "the material only mirrors, or reflects nothing at all: there is no BRDF to learn; "
+              "give a surface a roughness of 0.005 or more, or a layer or the base something "
+              "that scatters");
 }
+
+std::vector<std::string> WarningsOf(const Outlook& outlook) {
+  if (!(outlook.mirrored > 1e-4)) return {};
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "smooth surfaces mirror %.1f %% of the light, which no BRDF can hold and which is "
+                "left out; give them a roughness of 0.005 or more to have it",
+                100 * outlook.mirrored);
+  return {text};
+}
+
+Effort ScaledFor(const Outlook& outlook, Effort effort) {
+  const double scale = std::clamp(kUsualEvents / std::max(outlook.events, 1.0), 1.0 / 16, 1.0);
+  const auto scaled = [scale](int paths, int least) {
+    return std::max(least, static_cast<int>(scale * paths));
+  };
+  Accuracy& accuracy = effort.accuracy;
+  accuracy.pilot_paths = scaled(accuracy.pilot_paths, 8);
+  accuracy.min_paths = scaled(accuracy.min_paths, 8);
+  accuracy.max_paths = std::max(accuracy.min_paths, scaled(accuracy.max_paths, 8));
+  effort.draft_paths = scaled(effort.draft_paths, 2);
+  return effort;
+}
+
+double TrustOf(double standard_error) {
+  const double relative = standard_error / kTrustedError;
+  return 1 / (1 + relative * relative);
+}
+
+uint64_t CountedSquare(double standard_error) {
+  // More than any error of a logarithm that is still of use.
+  return static_cast<uint64_t>(std::min(standard_error * standard_error, 1.0) / kErrorUnit);
+}
+
+double MeanOfCounted(uint64_t squares, uint64_t pairs) {
+  if (pairs == 0) return 0;
+  return std::sqrt(static_cast<double>(squares) * kErrorUnit / static_cast<double>(pairs));
+}
+
+namespace {
 
 class StackTable : public brdf::SimulatedTable {
  public:
-  StackTable(const Simulator& simulator, const Effort& effort, double events)
-      : simulator_(simulator), accuracy_(effort.accuracy), seed_(effort.seed) {
-    const double scale = std::clamp(kUsualEvents / std::max(events, 1.0), 1.0 / 16, 1.0);
-    const auto scaled = [scale](int paths, int least) {
-      return std::max(least, static_cast<int>(scale * paths));
-    };
-    accuracy_.pilot_paths = scaled(accuracy_.pilot_paths, 8);
-    accuracy_.min_paths = scaled(accuracy_.min_paths, 8);
-    accuracy_.max_paths = std::max(accuracy_.min_paths, scaled(accuracy_.max_paths, 8));
-    draft_paths_ = scaled(effort.draft_paths, 2);
-  }
+  StackTable(const Simulator& simulator, const Effort& effort)
+      : simulator_(simulator), effort_(effort) {}
 
   bool Evaluate(const brdf::Direction& wi, const brdf::Direction& wo, float rgb[3]) const override {
     rgb[0] = rgb[1] = rgb[2] = 0;
     if (!(wi.z > 0 && wo.z > 0)) return false;
-    Store(simulator_.Evaluate(wi, wo, accuracy_, seed_), rgb);
+    Store(simulator_.Evaluate(wi, wo, effort_.accuracy, effort_.seed), rgb);
     return true;
   }
 
@@ -66,16 +101,13 @@ class StackTable : public brdf::SimulatedTable {
     *weight = 1;
     rgb[0] = rgb[1] = rgb[2] = 0;
     if (!(wi.z > 0 && wo.z > 0)) return false;
-    const Estimate estimate = simulator_.Evaluate(wi, wo, accuracy_, seed_);
+    const Estimate estimate = simulator_.Evaluate(wi, wo, effort_.accuracy, effort_.seed);
     Store(estimate, rgb);
     const double error = Simulator::StandardError(estimate, wi, wo);
-    const double relative = error / kTrustedError;
-    *weight = static_cast<float>(1 / (1 + relative * relative));
+    *weight = static_cast<float>(TrustOf(error));
     pairs_.fetch_add(1, std::memory_order_relaxed);
     paths_.fetch_add(static_cast<uint64_t>(estimate.spent), std::memory_order_relaxed);
-    // More than any error of a logarithm that is still of use.
-    const double square = std::min(error * error, 1.0);
-    squares_.fetch_add(static_cast<uint64_t>(square / kErrorUnit), std::memory_order_relaxed);
+    squares_.fetch_add(CountedSquare(error), std::memory_order_relaxed);
     return true;
   }
 
@@ -83,17 +115,14 @@ class StackTable : public brdf::SimulatedTable {
                      float rgb[3]) const override {
     rgb[0] = rgb[1] = rgb[2] = 0;
     if (!(wi.z > 0 && wo.z > 0)) return;
-    Store(simulator_.Average(wi, wo, draft_paths_, seed_), rgb);
+    Store(simulator_.Average(wi, wo, effort_.draft_paths, effort_.seed), rgb);
   }
 
   brdf::SimulationCost Spent() const override {
     brdf::SimulationCost cost;
     cost.pairs = pairs_.load();
     cost.paths = paths_.load();
-    if (cost.pairs > 0) {
-      cost.standard_error = std::sqrt(static_cast<double>(squares_.load()) * kErrorUnit /
-                                      static_cast<double>(cost.pairs));
-    }
+    cost.standard_error = MeanOfCounted(squares_.load(), cost.pairs);
     return cost;
   }
 
@@ -103,9 +132,7 @@ class StackTable : public brdf::SimulatedTable {
   }
 
   Simulator simulator_;
-  Accuracy accuracy_;
-  uint64_t seed_;
-  int draft_paths_ = 2;
+  Effort effort_;
   mutable std::atomic<uint64_t> pairs_{0}, paths_{0}, squares_{0};
 };
 
@@ -113,29 +140,15 @@ class StackTable : public brdf::SimulatedTable {
 
 Result<brdf::Source> SimulatedSource(const Stack& stack, const Effort& effort) {
   const Simulator simulator(stack);
-  const Trial trial = TryOut(simulator);
-  if (!(trial.scattered > 0)) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "the material only mirrors, or reflects nothing at all: there is no BRDF to learn; "
-                "give a surface a roughness of 0.005 or more, or a layer or the base something "
-                "that scatters");
-  }
+  PATINA_ASSIGN(const Outlook outlook, LookAhead(simulator));
   brdf::Source source;
   source.format = "layered";
   source.isotropic = simulator.isotropic();
-  source.simulated = std::make_shared<StackTable>(simulator, effort, trial.events);
+  source.simulated = std::make_shared<StackTable>(simulator, ScaledFor(outlook, effort));
   source.table = source.simulated;
   source.effects = EffectNames(simulator.effects());
   source.left_out_effects = LeftOutNames(simulator.effects());
-  if (trial.mirrored > 1e-4) {
-    char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "smooth surfaces mirror %.1f %% of the light, which no BRDF can hold and which is "
-        "left out; give them a roughness of 0.005 or more to have it",
-        100 * trial.mirrored);
-    source.warnings.push_back(text);
-  }
+  source.warnings = WarningsOf(outlook);
   return source;
 }
 

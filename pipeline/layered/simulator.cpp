@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "formats/base/check.h"
+#include "pipeline/layered/adaptive.h"
 
 namespace patina::layered {
 namespace {
@@ -27,20 +28,6 @@ uint64_t Bits(const brdf::Direction& w) {
 // A generator of its own for each pair of directions and each purpose.
 Rng PairRng(const brdf::Direction& wi, const brdf::Direction& wo, uint64_t seed, uint64_t purpose) {
   return Rng(Rng(seed, Bits(wi)).Next() + purpose, Bits(wo));
-}
-
-// Paths of an estimate for each of its pilot's, at the most.
-constexpr double kMostOverPilot = 4;
-
-Estimate Mean(const double sum[3], const double squares[3], int paths) {
-  Estimate estimate;
-  estimate.paths = estimate.spent = paths;
-  for (size_t c = 0; c < 3; ++c) {
-    const double mean = sum[c] / paths;
-    estimate.f[c] = mean;
-    estimate.variance[c] = std::max(0.0, squares[c] / paths - mean * mean) / (paths - 1);
-  }
-  return estimate;
 }
 
 }  // namespace
@@ -100,29 +87,16 @@ Estimate Simulator::Average(const brdf::Direction& wi, const brdf::Direction& wo
   }
   Rng rng = PairRng(wi, wo, seed, 1);
   AddPaths(wi, wo, paths, &rng, sum, squares);
-  return Mean(sum, squares, paths);
+  return MeanOf(sum, squares, paths);
 }
 
 Estimate Simulator::Evaluate(const brdf::Direction& wi, const brdf::Direction& wo,
                              const Accuracy& accuracy, uint64_t seed) const {
   if (closed_form()) return Average(wi, wo, 2, seed);
-  double sum[3] = {0, 0, 0}, squares[3] = {0, 0, 0};
-  Rng rng = PairRng(wi, wo, seed, 0);
-  int pilot = accuracy.pilot_paths;
-  AddPaths(wi, wo, pilot, &rng, sum, squares);
-  double wanted = 0;
-  for (;;) {
-    const double ratio = StandardError(Mean(sum, squares, pilot), wi, wo) / accuracy.standard_error;
-    wanted = std::clamp(pilot * ratio * ratio, static_cast<double>(accuracy.min_paths),
-                        static_cast<double>(accuracy.max_paths));
-    // Few paths say little of the variance of many: rare bright ones are missing among them.
-    if (wanted <= kMostOverPilot * pilot) break;
-    AddPaths(wi, wo, pilot, &rng, sum, squares);
-    pilot *= 2;
-  }
-  Estimate estimate = Average(wi, wo, static_cast<int>(wanted), seed);
-  estimate.spent += pilot;
-  return estimate;
+  return EstimateTo(accuracy, wi, wo, PairRng(wi, wo, seed, 0), PairRng(wi, wo, seed, 1),
+                    [&](int paths, Rng* rng, double sum[3], double squares[3]) {
+                      AddPaths(wi, wo, paths, rng, sum, squares);
+                    });
 }
 
 double Simulator::StandardError(const Estimate& estimate, const brdf::Direction& wi,

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "formats/base/check.h"
 #include "formats/half.h"
 #include "pipeline/bc6/block_encoder.h"
 #include "pipeline/material/feature_init.h"
@@ -178,6 +179,27 @@ void NeuralTexture::Rollback(ThreadPool& pool) {
   saved_.Restore(&store_);
   std::fill(gradient_.data(), gradient_.data() + gradient_.size(), 0.0f);
   ForgetTouched();
+  DecodeAll(pool);
+}
+
+void NeuralTexture::Start(std::span<const float> rows, ThreadPool& pool) {
+  PATINA_CHECK(rows.size() == values_.size() && store_.form == BlockForm::kFree);
+  for (int f = 0; f < shape_.features(); ++f) {
+    for (int l = 0; l < shape_.levels; ++l) {
+      FeatureLevel& level = store_.textures[f / 3][l];
+      const size_t first = static_cast<size_t>(first_row_[l]);
+      for (int block = 0; block < level.block_count(); ++block) {
+        float* texels = level.params.data() +
+                        static_cast<size_t>(block) * BlockStride(BlockForm::kFree) + f % 3 * 16;
+        // What lies beyond the edge of the level repeats its last texels.
+        for (int k = 0; k < 16; ++k) {
+          const int x = std::min(block % level.blocks_x * 4 + k % 4, level.width - 1);
+          const int y = std::min(block / level.blocks_x * 4 + k / 4, level.height - 1);
+          texels[k] = rows[(first + static_cast<size_t>(y) * level.width + x) * kRowFloats + f];
+        }
+      }
+    }
+  }
   DecodeAll(pool);
 }
 

@@ -56,6 +56,9 @@ class NeuralTexture : public brdf::TexturePart {
   // level s, which is clamped to the levels there are: as decoders sample.
   brdf::TexelTaps LookUp(float u, float v, float s) const;
 
+  // Gives free texels the values of these rows (see rows(); padding is not looked at).
+  void Start(std::span<const float> rows, ThreadPool& pool);
+
   // The step of the next Update; 0 leaves the texture as it is.
   void SetRates(float texel, float index) { rates_.endpoint = texel, rates_.index = index; }
 

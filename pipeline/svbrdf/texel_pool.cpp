@@ -8,13 +8,10 @@
 #include <utility>
 
 #include "pipeline/base/rng.h"
+#include "pipeline/svbrdf/place_drawer.h"
 
 namespace patina::svbrdf {
 namespace {
-
-// The share of samples that a small mip gets at least.
-constexpr double kLevelFloor = 0.01;
-constexpr float kOffGridShare = 0.5f;
 
 PlaneLevel NextMip(const PlaneLevel& level) {
   PlaneLevel next;
@@ -31,49 +28,18 @@ PlaneLevel NextMip(const PlaneLevel& level) {
   return next;
 }
 
-std::vector<double> LevelShares(const ImageSet& set, int levels) {
-  std::vector<double> texels, cumulative;
-  double all = 0, total = 0;
-  for (int l = 0; l < levels; ++l) {
-    texels.push_back(static_cast<double>(std::max(1, set.width >> l)) *
-                     std::max(1, set.height >> l));
-    all += texels.back();
-  }
-  for (const double count : texels) {
-    total += std::max(count / all, kLevelFloor);
-    cumulative.push_back(total);
-  }
-  for (double& share : cumulative) share /= total;
-  return cumulative;
-}
-
 class Drawer {
  public:
   Drawer(const ImageSet& set, const TexelPoolOptions& options)
-      : set_(set), options_(options), shares_(LevelShares(set, options.levels)) {}
+      : set_(set), options_(options), places_(set.width, set.height, options.levels) {}
 
   void Draw(size_t image, const std::vector<PlaneLevel>& mips, size_t count,
             TexelSample* out) const {
     Rng rng(options_.seed, image + 1);
     for (size_t i = 0; i < count; ++i) {
       TexelSample& sample = out[i];
-      sample.image = static_cast<uint32_t>(image);
-      const double pick = static_cast<double>(rng.Uniform());
-      int level = 0;
-      while (level + 1 < options_.levels && pick >= shares_[level]) ++level;
-      const PlaneLevel& at = mips[level];
-      if (rng.Uniform() < kOffGridShare) {
-        sample.u = rng.Uniform();
-        sample.v = rng.Uniform();
-        const float fraction = rng.Uniform();
-        sample.s = static_cast<float>(level) + (level + 1 < options_.levels ? fraction : 0.0f);
-      } else {
-        const auto x = static_cast<float>(rng.Below(static_cast<uint32_t>(at.width)));
-        const auto y = static_cast<float>(rng.Below(static_cast<uint32_t>(at.height)));
-        sample.u = (x + 0.5f) / static_cast<float>(at.width);
-        sample.v = (y + 0.5f) / static_cast<float>(at.height);
-        sample.s = static_cast<float>(level);
-      }
+      sample.pair = static_cast<uint32_t>(image);
+      places_.Draw(&rng, &sample.u, &sample.v, &sample.s);
       const float low = std::floor(sample.s), fraction = sample.s - low;
       AddLevel(mips[static_cast<size_t>(low)], sample.u, sample.v, 1 - fraction, sample.value);
       if (fraction > 0)
@@ -95,7 +61,7 @@ class Drawer {
 
   const ImageSet& set_;
   const TexelPoolOptions& options_;
-  std::vector<double> shares_;
+  PlaceDrawer places_;
 };
 
 }  // namespace
@@ -117,7 +83,6 @@ Result<TexelPool> DrawTexels(const ImageSet& set, const TexelPoolOptions& option
   for (size_t i = 0; i < images; ++i) {
     brdf::LookUpPair(options.grid, set.images[i].light, set.images[i].view, &drawn.lookups[i]);
     drawn.lookups[i].cosine = set.images[i].light.z;
-    drawn.lookups[i].importance = 1;
   }
   const Drawer drawer(set, options);
   std::mutex mutex;
@@ -141,12 +106,14 @@ Result<TexelPool> DrawTexels(const ImageSet& set, const TexelPoolOptions& option
   if (options.cancel != nullptr && options.cancel->cancelled())
     return Fail(ErrorCode::kCancelled, "interrupted");
   if (first_error) return Fail(std::move(first_error->second));
-  Rng rng(options.seed, 0);
-  for (size_t i = drawn.samples.size(); i > 1; --i) {
-    const size_t j = rng.Below(static_cast<uint32_t>(i));
-    std::swap(drawn.samples[i - 1], drawn.samples[j]);
-  }
+  Shuffle(options.seed, &drawn.samples);
   return drawn;
+}
+
+void Shuffle(uint64_t seed, std::vector<TexelSample>* samples) {
+  Rng rng(seed, 0);
+  for (size_t i = samples->size(); i > 1; --i)
+    std::swap((*samples)[i - 1], (*samples)[rng.Below(static_cast<uint32_t>(i))]);
 }
 
 }  // namespace patina::svbrdf

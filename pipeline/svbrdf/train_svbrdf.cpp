@@ -52,6 +52,7 @@ class Session {
         batch_(std::min<size_t>(options.batch, train_count_)),
         held_out_(held_out_count_) {
     trainer_.UseTexture(&texture_);
+    if (!pool.start.empty()) texture_.Start(pool.start, threads);
     // Of so few samples that none can be held back the same ones.
     Fill(pool.samples.size() - held_out_count_, &held_out_);
   }
@@ -106,14 +107,15 @@ class Session {
       for (size_t i = begin; i < end; ++i) {
         const TexelSample& from = pool_.samples[first + i];
         brdf::PoolSample& to = batch->samples[i];
-        to = pool_.lookups[from.image];
+        to = pool_.lookups[from.pair];
         std::copy_n(from.value, 3, to.value);
+        to.importance = from.importance;
         batch->taps[i] = texture_.LookUp(from.u, from.v, from.s);
       }
     });
   }
 
-  // The square root of how much each corner is looked up: images weigh alike.
+  // The square root of how much each corner is looked up: pairs weigh alike.
   void CountUsage() {
     usage_.assign(static_cast<size_t>(trainer_.corners()), 0.0f);
     for (size_t i = 0; i < pool_.lookups.size(); ++i) {
@@ -272,12 +274,12 @@ class Session {
 
 }  // namespace
 
-SvbrdfShape DefaultSvbrdfShape(int width, int height, AddressMode address) {
+SvbrdfShape DefaultSvbrdfShape(int width, int height, AddressMode address, bool isotropic) {
   SvbrdfShape shape;
   shape.model.grid.nside = 8;
-  shape.model.grid.isotropic = false;
-  shape.model.grid.canonical_order = false;
-  shape.model.grid.half_vector_inputs = true;
+  shape.model.grid.isotropic = isotropic;
+  shape.model.grid.canonical_order = isotropic;
+  shape.model.grid.half_vector_inputs = !isotropic;
   shape.model.index_bits = 8;
   shape.model.hidden = 64;
   shape.model.hidden_layers = 2;
@@ -288,12 +290,13 @@ SvbrdfShape DefaultSvbrdfShape(int width, int height, AddressMode address) {
   return shape;
 }
 
-size_t WantedSamples(const SvbrdfOptions& options, const TextureShape& texture, size_t images) {
-  constexpr size_t kMost = (size_t{1} << 28) / sizeof(TexelSample), kOfATexel = 16;
+size_t WantedSamples(const SvbrdfOptions& options, const TextureShape& texture,
+                     const VaryingSource& source) {
+  constexpr size_t kMost = 9586980;  // 300 MB
   const size_t trained = static_cast<size_t>(options.batch) *
                          static_cast<size_t>(options.free_steps + options.block_steps);
-  const size_t there = kOfATexel * images * static_cast<size_t>(texture.texels());
-  return std::min({trained + kHeldOut, there, kMost});
+  return std::min(source.SamplesWorth(trained + kHeldOut, static_cast<size_t>(texture.texels())),
+                  kMost);
 }
 
 uint64_t TrainedSvbrdf::texture_bytes() const {

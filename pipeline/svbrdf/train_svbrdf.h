@@ -14,7 +14,7 @@
 #include "formats/weights.h"
 #include "pipeline/brdf/train_brdf.h"
 #include "pipeline/svbrdf/neural_texture.h"
-#include "pipeline/svbrdf/texel_pool.h"
+#include "pipeline/svbrdf/varying_source.h"
 
 namespace patina::svbrdf {
 
@@ -23,9 +23,10 @@ struct SvbrdfShape {
   TextureShape texture;
 };
 
-// For images of this size: anisotropic, without canonical order (texels of a rough surface shadow
-// and hide each other, which is not reciprocal), with all scalars.
-SvbrdfShape DefaultSvbrdfShape(int width, int height, AddressMode address);
+// For a source of this size. Unless it is isotropic (VaryingSource::isotropic): with an azimuth of
+// its own, without canonical order (texels of a rough surface shadow and hide each other, which is
+// not reciprocal), with all scalars.
+SvbrdfShape DefaultSvbrdfShape(int width, int height, AddressMode address, bool isotropic = false);
 
 enum class TextureForm {
   kBlocks,  // BC6H
@@ -41,7 +42,7 @@ struct SvbrdfOptions {
   int final_steps = 3000;  // behind a texture that stays as it is
   float feature_rate = 0.01f;
   float network_rate = 0.004f;
-  float texel_rate = 0.02f;  // of free texels
+  float texel_rate = 0.02f;   // of free texels
   float block_rate = 0.005f;  // of end points, binades
   float index_rate = 0.01f;
   float decay = 0.02f;
@@ -49,9 +50,10 @@ struct SvbrdfOptions {
   RateFault rate_fault;  // for tests
 };
 
-// Samples that are worth drawing from an image set: as many as are trained on, but no more than the
-// images have to say or 256 MB can hold.
-size_t WantedSamples(const SvbrdfOptions& options, const TextureShape& texture, size_t images);
+// Samples that are worth drawing: as many as are trained on, but no more than the source has to say
+// or 300 MB can hold.
+size_t WantedSamples(const SvbrdfOptions& options, const TextureShape& texture,
+                     const VaryingSource& source);
 
 struct TrainedSvbrdf {
   SvbrdfShape shape;

@@ -48,6 +48,11 @@ Job SourceFor(const Job& source, const Manifest& manifest) {
   job.file.clear();
   if (manifest.brdf) {
     job.kind = manifest.brdf->images ? JobKind::kSvbrdf : JobKind::kBrdf;
+    if (manifest.brdf->source_format == kTextureSetFormat) {
+      const fs::path inner = folder / manifest.asset;
+      job.folder = fs::is_directory(inner, ignored) ? inner.string() : folder.string();
+      return job;
+    }
     job.folder.clear();
     if (!manifest.brdf->files.empty()) {
       const std::string& name = manifest.brdf->files[0].path;
@@ -93,14 +98,19 @@ void RemeasureSvbrdf(const Container& container, const Job& job, ThreadPool& poo
                      const CancelToken& cancel, ProgressSink& progress, const std::string& file,
                      FindingList* findings) {
   const auto refuse = [&](const Error& error) { findings->Add(6102, file, {}, error.message); };
-  const auto source = ReadSvbrdfSource(job, pool, cancel);
-  if (!source) return refuse(source.error());
   const ManifestBrdf& model = *container.manifest.brdf;
+  // What is simulated to compare with is the same then.
+  Job again_job = job;
+  again_job.seed = container.manifest.seed;
+  again_job.quality = ParseQuality(container.manifest.quality_setting).value_or(job.quality);
+  again_job.address = model.images->address == "wrap" ? AddressMode::kWrap : AddressMode::kClamp;
+  const auto source = ReadSvbrdfSource(again_job, pool, cancel, progress);
+  if (!source) return refuse(source.error());
   if (model.images->sha256 != source->images_sha256) {
     findings->Add(1401, file, {"/source/images", {}},
-                  "the images are not those that the container was baked from");
+                  "the images or maps are not those that the container was baked from");
   }
-  const auto measured = MeasureSvbrdf(container.directory, source->set, pool, cancel, progress);
+  const auto measured = MeasureSvbrdf(container.directory, *source->texels, pool, cancel, progress);
   if (!measured) return refuse(measured.error());
   ManifestBrdf again;
   DescribeSvbrdfQuality(*measured, &again);

@@ -27,6 +27,7 @@
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/sample_btf.h"
 #include "pipeline/jobs/sheet.h"
+#include "pipeline/svbrdf/image_set_source.h"
 #include "pipeline/svbrdf/train_svbrdf.h"
 
 namespace patina {
@@ -269,7 +270,7 @@ class Runner {
     for (int* steps : {&options_.free_steps, &options_.block_steps, &options_.final_steps})
       *steps = std::max(1, static_cast<int>(*steps * arguments_.steps_scale));
     svbrdf::TexelPoolOptions drawing;
-    drawing.count = WantedSamples(options_, shape_.texture, set_.images.size());
+    drawing.count = WantedSamples(options_, shape_.texture, svbrdf::ImageSetSource(set_));
     drawing.levels = shape_.texture.levels;
     drawing.grid = shape_.model.grid;
     drawing.seed = arguments_.seed;

@@ -178,5 +178,93 @@ TEST_F(BakedBtf, BadSetsAreBadInput) {
   EXPECT_FALSE(fs::exists(folder / "out/bumps/current"));
 }
 
+// Layers with maps, and a texture set: the same way as measured images.
+class BakedMaps : public testing::Test {
+ protected:
+  // With a model that is small enough to be learned in a second.
+  static std::string WriteJobOf(const std::string& path, Json input) {
+    Json job = {{"version", 1},         {"kind", "svbrdf"},
+                {"asset", "maps"},      {"out", "out"},
+                {"quality", "preview"}, {"model", {{"nside", 4}, {"hidden", 32}, {"textures", 2}}}};
+    job.update(input);
+    std::ofstream(path) << job.dump();
+    return path;
+  }
+  Json Manifest() {
+    Json manifest = Json::parse(ReadAll(folder_ / "out/maps/current/manifest.json"));
+    const Status status = CheckAgainstSchema("manifest", manifest);
+    EXPECT_TRUE(status) << status.error().message;
+    return manifest;
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(BakedMaps, LayersAreSimulatedAtEachTexel) {
+  const std::string in = folder_ / "in", list = in + "/scratched_lacquer.layers.json";
+  ASSERT_EQ(Patina({"sample", "--kind", "svlayers", "--out", in, "--size", "16"}).exit_code, 0);
+  const std::string job =
+      WriteJobOf(folder_ / "job.json", {{"file", "in/scratched_lacquer.layers.json"}});
+  const Outcome baked = Patina({"bake", job, "--json"});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  const Json result = Json::parse(baked.out);
+  EXPECT_TRUE(CheckAgainstSchema("result", result));
+  EXPECT_GT(result["svbrdf"]["psnr"], 22);
+  const Json manifest = Manifest();
+  const Json& source = manifest["source"];
+  EXPECT_EQ(source["format"], "layered");
+  EXPECT_EQ(source["images"]["count"], 0);
+  EXPECT_EQ(source["files"].size(), 4u);
+  EXPECT_GT(source["simulation"]["paths"], 100000);
+  EXPECT_EQ(source["simulation"]["effects"],
+            Json::array({"rough refraction", "absorption", "colour"}));
+  EXPECT_TRUE(manifest["brdf"]["isotropic"] && manifest["brdf"]["canonical_order"]);
+  EXPECT_THAT(Patina({"info", folder_ / "out/maps"}).out,
+              AllOf(HasSubstr("maps of 16 x 16 texels"), HasSubstr("simulated")));
+  EXPECT_THAT(ReadAll(folder_ / "out/maps/current/report.html"),
+              AllOf(HasSubstr("Three of 64 pairs"), HasSubstr("rough refraction")));
+  const Outcome valid =
+      Patina({"validate", folder_ / "out/maps", "--against", list, "--fail-on", "warning"});
+  EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
+
+  // The same bytes for other threads; another map is found out.
+  ASSERT_EQ(Patina({"bake", job, "--threads", "3", "--simd", "avx2"}).exit_code, 0);
+  for (const char* file : {"manifest.json", "features_0.dds", "decoder.weights", "preview.png"}) {
+    EXPECT_EQ(ReadAll(folder_ / ("out/maps/r0001/" + std::string(file))),
+              ReadAll(folder_ / ("out/maps/r0002/" + std::string(file))))
+        << file;
+  }
+  fs::copy_file(in + "/lacquer_roughness.png", in + "/lacquer_thickness.png",
+                fs::copy_options::overwrite_existing);
+  const Outcome other =
+      Patina({"validate", folder_ / "out/maps", "--against", list, "--fail-on", "warning"});
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_THAT(other.out, HasSubstr("are not those"));
+}
+
+TEST_F(BakedMaps, ATextureSetBecomesReflectance) {
+  const std::string in = folder_ / "in";
+  ASSERT_EQ(Patina({"sample", "--kind", "material", "--out", in, "--size", "16"}).exit_code, 0);
+  fs::remove(in + "/job.json");
+  const std::string job = WriteJobOf(folder_ / "job.json", {{"folder", "in"}});
+  const Outcome baked = Patina({"bake", job, "--address", "clamp"});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  EXPECT_THAT(baked.err, HasSubstr("no part of the reflectance: ao, displacement, emissive"));
+  const Json manifest = Manifest();
+  EXPECT_EQ(manifest["source"]["format"], "texture_set");
+  EXPECT_EQ(manifest["source"]["images"]["address"], "clamp");
+  EXPECT_FALSE(manifest["brdf"]["isotropic"]);
+  EXPECT_GT(manifest["quality"]["image_ssim"], 0.5);
+  const Outcome valid =
+      Patina({"validate", folder_ / "out/maps", "--against", in, "--fail-on", "warning"});
+  EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
+
+  // What cannot become reflectance says why.
+  fs::remove(in + "/mosaic_floor_basecolor.png");
+  const Outcome bare = Patina({"bake", in, "--as", "svbrdf", "--out", folder_ / "bare"});
+  EXPECT_EQ(bare.exit_code, 3);
+  EXPECT_THAT(bare.err, HasSubstr("no base colour"));
+}
+
 }  // namespace
 }  // namespace patina

@@ -94,8 +94,30 @@ TEST(Roots, TheImagesOfASetAreInputsToo) {
   job.file = "/in/cloth/cloth.btf.json";
   job.kind = JobKind::kSvbrdf;
   EXPECT_EQ(InputsOf(job, {{"/in"}, {}}), (std::vector<std::string>{job.file, "/in/cloth"}));
+  job.file = "/in/lacquer/lacquer.layers.json";  // maps lie beside it
+  EXPECT_EQ(InputsOf(job, {{"/in"}, {}}), (std::vector<std::string>{job.file, "/in/lacquer"}));
   job.kind = JobKind::kBrdf;
   EXPECT_EQ(InputsOf(job, {{"/in"}, {}}), std::vector<std::string>{job.file});
+}
+
+TEST(Roots, AReflectanceOfATextureSetReadsItsFolderOrItsList) {
+  const patina::test::TemporaryDirectory folder;
+  fs::create_directories(folder / "in/wall");
+  const Roots roots = {{folder / "in"}, {folder / "out"}};
+  Job job;
+  job.kind = JobKind::kSvbrdf;
+  job.folder = folder / "in/wall";
+  job.out = folder / "out";
+  ASSERT_OK(ConfineJob(roots, &job));
+  EXPECT_EQ(InputsOf(job, roots), std::vector<std::string>{job.folder});
+  job.folder = folder / "elsewhere";
+  EXPECT_EQ(patina::test::MessageOf(ConfineJob(roots, &job)).rfind("/folder: ", 0), 0u);
+  job.folder.clear();
+  job.maps.emplace_back();
+  job.maps[0].role = "albedo";
+  job.maps[0].file = folder / "in/wall/c.png";
+  ASSERT_OK(ConfineJob(roots, &job));
+  EXPECT_EQ(InputsOf(job, roots), std::vector<std::string>{job.maps[0].file});
 }
 
 TEST(Roots, LinksWithinTheRootsAreInputsToo) {

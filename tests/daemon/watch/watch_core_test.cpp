@@ -406,6 +406,22 @@ TEST(WatchCore, OffersMapsAndMeasurementsOfAFolderApart) {
   EXPECT_THAT(rig.TakeReady(), ElementsAre("lab_gold"));
 }
 
+TEST(WatchCore, OffersLayersAsPartOfTheFolderThatHoldsTheirMaps) {
+  DropFolderRig rig;
+  rig.Write("lab/wood.png", "w");
+  rig.Write("lab/lacquer.layers.json", R"({"base": {"albedo": {"map": "wood.png"}}})");
+  rig.Write("lab/plain.layers.json", R"({"base": {"albedo": 0.5}})");
+  rig.Advance(3 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), UnorderedElementsAre("lab", "lab_plain"));
+  rig.Write("lab/wood.png", "W");
+  rig.Advance(3 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), ElementsAre("lab"));
+  // No image changes, and the folder is another one.
+  rig.Write("lab/lacquer.layers.json", R"({"base": {"albedo": {"map": "wood.png", "scale": 1}}})");
+  rig.Advance(4 * kSettle);
+  EXPECT_THAT(rig.TakeReady(), ElementsAre("lab"));
+}
+
 TEST(WatchCore, OffersAgainWhatCouldNotBeHandedOver) {
   DropFolderRig rig;
   rig.refuse = true;

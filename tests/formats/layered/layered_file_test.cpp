@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/base/file_io.h"
+#include "formats/layered/varying_stack.h"
 #include "formats/schema_check.h"
 
 namespace patina::layered {
@@ -25,7 +26,7 @@ std::string ExampleText(const std::string& name) {
 
 // What is wrong; empty if nothing is.
 std::string Problem(std::string_view text) {
-  const auto stack = ParseStack(text, "x.layers.json");
+  const auto stack = ParseVaryingStack(text, "x.layers.json");
   return stack ? "" : stack.error().message;
 }
 
@@ -57,6 +58,85 @@ TEST(LayeredFile, ReadsEveryField) {
   EXPECT_EQ(stack->parts[2].albedo, (Rgb{0.1, 0.2, 0.7}));
   EXPECT_EQ(stack->parts[2].weight, 0.2);
   EXPECT_TRUE(ParseStack(ExampleText("layered_black.json"), "x")->parts.empty());
+}
+
+TEST(LayeredFile, ReadsMapsInPlaceOfNumbers) {
+  const auto read = ParseVaryingStack(ExampleText("layered_maps.json"), "maps");
+  ASSERT_TRUE(read.has_value()) << read.error().message;
+  EXPECT_FALSE(read->wrap);
+  ASSERT_TRUE(read->normal.has_value());
+  EXPECT_TRUE(read->normal->directx);
+  EXPECT_EQ(read->Files(),
+            (std::vector<std::string>{"brushed.png", "flakes.png", "normal.png", "thickness.png",
+                                      "tint.png", "turn.png", "wood.png"}));
+  const struct {
+    const char* pointer;
+    StackNumber number;
+    int layer, part, axis;
+  } wanted[] = {{"/layers/0/roughness/0", StackNumber::kRoughness, 0, -1, 0},
+                {"/layers/0/rotation_deg", StackNumber::kRotation, 0, -1, -1},
+                {"/layers/0/thickness", StackNumber::kThickness, 0, -1, -1},
+                {"/layers/0/absorption", StackNumber::kAbsorption, 0, -1, -1},
+                {"/layers/0/asymmetry", StackNumber::kAsymmetry, 0, -1, -1},
+                {"/layers/1/ior", StackNumber::kIor, 1, -1, -1},
+                {"/layers/1/roughness", StackNumber::kRoughness, 1, -1, -1},
+                {"/base/parts/0/weight", StackNumber::kWeight, -1, 0, -1},
+                {"/base/parts/1/albedo", StackNumber::kAlbedo, -1, 1, -1}};
+  ASSERT_EQ(read->maps.size(), std::size(wanted));
+  for (size_t m = 0; m < read->maps.size(); ++m) {
+    const StackMap& map = read->maps[m];
+    EXPECT_EQ(map.pointer, wanted[m].pointer);
+    EXPECT_EQ(map.number, wanted[m].number) << map.pointer;
+    EXPECT_EQ(map.layer, wanted[m].layer) << map.pointer;
+    EXPECT_EQ(map.part, wanted[m].part) << map.pointer;
+    EXPECT_EQ(map.axis, wanted[m].axis) << map.pointer;
+  }
+  EXPECT_EQ(read->maps[2].channel, "g");
+  EXPECT_EQ(read->maps[2].scale, 1.5);
+  EXPECT_EQ(read->maps[2].offset, 0.01);
+  EXPECT_EQ(read->maps[8].color_space, "srgb");
+  EXPECT_EQ(read->stack.layers[0].roughness.y, 0.2);
+  EXPECT_EQ(read->stack.parts[1].weight, 0.5);
+  // Who wants one point's numbers is told which is none.
+  const auto plain = ParseStack(ExampleText("layered_maps.json"), "maps");
+  ASSERT_FALSE(plain.has_value());
+  EXPECT_THAT(plain.error().message,
+              AllOf(StartsWith("maps: /layers/0/roughness/0: is a map"), HasSubstr("\"svbrdf\"")));
+  EXPECT_FALSE(ParseVaryingStack(ExampleText("layered_full.json"), "full")->varies());
+}
+
+// Reader and schema must agree on maps, too.
+TEST(LayeredFile, RefusesMapsThatCannotBe) {
+  const Json full = Json::parse(ExampleText("layered_maps.json"));
+  const Json flat = full.flatten();
+  for (const auto& [pointer, value] : flat.items()) {
+    const std::string key = pointer.substr(pointer.rfind('/') + 1);
+    if (key != "map" && key != "scale" && key != "offset" && key != "channel" &&
+        key != "color_space" && key != "convention" && key != "address")
+      continue;
+    for (const Json& wrong :
+         {Json(nullptr), Json(true), Json(-1), Json(1e300), Json(""), Json("x"), Json("g"),
+          Json("../x.png"), Json(".x"), Json("a/b.png"), Json(Json::object()), Json(0)}) {
+      Json json = full;
+      json[Json::json_pointer(pointer)] = wrong;
+      const std::string problem = Problem(json.dump());
+      EXPECT_EQ(CheckAgainstSchema("layered", json).has_value(), problem.empty())
+          << pointer << " " << wrong << " " << problem;
+      // The pointer is that of the value, or of what it stands in.
+      if (!problem.empty()) {
+        EXPECT_THAT(problem, HasSubstr(pointer.substr(0, pointer.rfind('/')))) << problem;
+      }
+    }
+  }
+  Json json = full;
+  json["layers"][0]["thickness"]["gain"] = 2;
+  EXPECT_THAT(Problem(json.dump()), HasSubstr("/layers/0/thickness/gain"));
+  json = full;
+  json["layers"][0]["thickness"].erase("map");
+  EXPECT_THAT(Problem(json.dump()), HasSubstr("/layers/0/thickness: \"map\" is missing"));
+  json = full;
+  json["layers"][0]["absorption"]["color_space"] = "srgb";  // data is not converted
+  EXPECT_THAT(Problem(json.dump()), HasSubstr("/layers/0/absorption/color_space"));
 }
 
 TEST(LayeredFile, WritesWhatItReads) {

@@ -220,5 +220,31 @@ TEST_F(JobSets, LayeredMaterialsAreKnownByTheirName) {
   EXPECT_EQ(*files, std::vector<std::string>{folder_ + "/wood.layers.json"});
 }
 
+TEST_F(JobSets, LayersOwnTheMapsThatTheyName) {
+  Image("lab/wood_albedo.png");
+  Image("lab/lacquer_roughness.png", 0.2f);
+  Text("lab/lacquer.layers.json", R"({"version": 1,
+    "layers": [{"ior": 1.5, "roughness": {"map": "lacquer_roughness.png"}}],
+    "base": {"kind": "diffuse", "albedo": {"map": "wood_albedo.png"}}})");
+  Text("lab/plain.layers.json", R"({"version": 1, "base": {"kind": "diffuse", "albedo": 0.5}})");
+  for (const char* where : {"", "/lab"}) {
+    const auto found = FindAssets(folder_ + where, "");
+    ASSERT_TRUE(found) << found.error().message;
+    ASSERT_EQ(found->assets.size(), 2u) << where;
+    EXPECT_EQ(found->assets[0].asset, "lacquer");
+    EXPECT_EQ(found->assets[0].problem, "");
+    EXPECT_EQ(JobOfBrdfFile("a", found->assets[0].file).kind, JobKind::kSvbrdf);
+    EXPECT_EQ(JobOfBrdfFile("a", found->assets[1].file).kind, JobKind::kBrdf);
+  }
+  EXPECT_EQ(FindMappedStacks(folder_ + "/lab"),
+            std::vector<std::string>{folder_ + "/lab/lacquer.layers.json"});
+  // Maps that nobody names are a set as ever.
+  Image("lab/wall_basecolor.png");
+  const auto both = FindAssets(folder_ + "/lab", "");
+  ASSERT_TRUE(both) << both.error().message;
+  ASSERT_EQ(both->assets.size(), 3u);
+  EXPECT_EQ(both->assets[0].file, "");
+}
+
 }  // namespace
 }  // namespace patina

@@ -215,7 +215,7 @@ TEST(TexelPool, SamplesAreTheFilteredImages) {
   for (size_t s = 0; s < drawn->samples.size(); ++s) {
     const TexelSample& sample = drawn->samples[s];
     EXPECT_EQ(0, std::memcmp(&sample, &again->samples[s], sizeof sample));
-    EXPECT_NEAR(sample.value[0], 0.1f * static_cast<float>(sample.image + 1), 1e-6f);
+    EXPECT_NEAR(sample.value[0], 0.1f * static_cast<float>(sample.pair + 1), 1e-6f);
     const float margin = std::exp2(std::ceil(sample.s)) / 2;  // half a texel of the coarser level
     const float x = sample.u * 16, y = sample.v * 8;
     if (x < margin || x > 16 - margin || y < margin || y > 8 - margin) continue;

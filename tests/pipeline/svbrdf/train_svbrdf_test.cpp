@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "pipeline/svbrdf/image_set_source.h"
 #include "tests/hard_cases/everywhere.h"
 #include "tests/pipeline/svbrdf/set_files.h"
 
@@ -41,7 +42,7 @@ Trained Train(const std::string& list, int threads, const SvbrdfOptions& options
   EXPECT_TRUE(set) << set.error().message;
   const SvbrdfShape shape = Small(set->width, set->height, set->address);
   TexelPoolOptions drawing;
-  drawing.count = WantedSamples(options, shape.texture, set->images.size());
+  drawing.count = WantedSamples(options, shape.texture, ImageSetSource(*set));
   drawing.levels = shape.texture.levels;
   drawing.grid = shape.model.grid;
   auto texels = DrawTexels(*set, drawing, pool);
@@ -52,7 +53,7 @@ Trained Train(const std::string& list, int threads, const SvbrdfOptions& options
   for (const TexelSample& sample : texels->samples) {
     for (const float value : sample.value)
       trained.black += std::log1p(std::max(0.0, static_cast<double>(value)) *
-                                  static_cast<double>(texels->lookups[sample.image].cosine));
+                                  static_cast<double>(texels->lookups[sample.pair].cosine));
   }
   trained.black /= 3 * static_cast<double>(texels->samples.size());
   return trained;

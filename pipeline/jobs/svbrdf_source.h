@@ -1,0 +1,48 @@
+// What a job of kind "svbrdf" learns from: a set of measured images, a layered material with maps,
+// or a texture set.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "formats/base/result.h"
+#include "formats/manifest.h"
+#include "pipeline/base/progress.h"
+#include "pipeline/base/thread_pool.h"
+#include "pipeline/jobs/job.h"
+#include "pipeline/svbrdf/varying_source.h"
+
+namespace patina {
+
+// What SvbrdfSource::format and manifests call a texture set.
+inline constexpr const char* kTextureSetFormat = "texture_set";
+
+// A source that was read, and the fingerprint of what is made from it.
+struct SvbrdfSource {
+  std::string format;  // "image_set", "layered", kTextureSetFormat
+  std::shared_ptr<const svbrdf::VaryingSource> texels;
+  uint64_t images = 0;                  // measured ones
+  std::vector<std::string> paths;       // of all files, those of the images or maps last
+  std::vector<std::string> digests;     // SHA-256 of each
+  std::vector<ManifestBrdfFile> files;  // for the manifest
+  std::string images_sha256;            // as in ManifestImageSet
+  std::string fingerprint;              // recipe version, canonical job, what was read and how
+  std::string found;                    // for people
+  bool simulated = false;
+  std::vector<std::string> effects, left_out;  // of what f follows from; empty of images
+  std::vector<std::string> warnings;
+};
+
+// Reads the source and hashes its files; pixels of measured images are looked at by
+// VaryingSource::Draw alone. Errors: those of ReadImageSet, Sha256OfFile, ReadVaryingStack and
+// StackModel::Load, MapsOfJob, LoadSourceMaps and PbrModel::Make; kCancelled.
+Result<SvbrdfSource> ReadSvbrdfSource(const Job& job, ThreadPool& pool, const CancelToken& cancel,
+                                      ProgressSink& progress);
+
+// Whether the files still are what was read: who copies a set meanwhile must not get a container
+// under a wrong name. Errors: kConflict; those of Sha256OfFile; kCancelled.
+Status CheckUnchanged(const SvbrdfSource& source, ThreadPool& pool, const CancelToken& cancel);
+
+}  // namespace patina
