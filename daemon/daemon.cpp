@@ -53,11 +53,15 @@ int CheckConfig(const LoadedConfig& loaded) {
     return kExitBadInput;
   }
   auto answer = AskFarm(loaded.config, SystemClock());
-  if (!answer) {
-    std::fprintf(stderr, "patinad: error: %s\n", answer.error().message.c_str());
-    return kExitBadInput;
+  if (answer) {
+    std::fputs(answer->c_str(), stdout);
+  } else {
+    // A farm that is down must not keep the daemon from starting: it waits for it.
+    const bool is_down = answer.error().code == ErrorCode::kIo;
+    std::fprintf(stderr, "patinad: %s: %s\n", is_down ? "warning" : "error",
+                 answer.error().message.c_str());
+    if (!is_down) return kExitBadInput;
   }
-  std::fputs(answer->c_str(), stdout);
   std::printf("patinad: the configuration is good\n");
   return kExitDone;
 }

@@ -83,6 +83,16 @@ Result<std::unique_ptr<FarmCommands>> MakeCommands(const ExecutorConfig& executo
   return MakeTemplateCommands(options);
 }
 
+CommandOutcome RunToItsEnd(CommandRunner* runner, const Words& words, int64_t timeout_ms) {
+  runner->Start(words, timeout_ms);
+  std::vector<CommandOutcome> ended;
+  while ((ended = runner->Poll()).empty()) {
+    pollfd ready{runner->poll_fd(), POLLIN, 0};
+    ::poll(&ready, 1, static_cast<int>(runner->timeout_ms()));
+  }
+  return std::move(ended[0]);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Executor>> MakeExecutor(const Config& config,
@@ -116,21 +126,20 @@ Result<std::unique_ptr<Executor>> MakeExecutor(const Config& config,
 
 Result<std::string> AskFarm(const Config& config, Clock& clock) {
   if (!OnFarm(config)) return std::string();
-  PATINA_TRY(MakeCommands(config.executor));
+  PATINA_ASSIGN(const std::unique_ptr<FarmCommands> commands, MakeCommands(config.executor));
   if (config.executor.kind != ExecutorKind::kSlurm) return std::string();
   PATINA_ASSIGN(CommandRunner runner, CommandRunner::Create(clock));
+  const int64_t timeout_ms = Milliseconds(config.executor.command_timeout_s);
   const Words words = SlurmDryRun(SlurmOptionsOf(config.executor), ThreadsOf(0, config),
                                   config.limits.memory_mb, config.limits.wall_s);
-  runner.Start(words, Milliseconds(config.executor.command_timeout_s));
-  std::vector<CommandOutcome> ended;
-  while ((ended = runner.Poll()).empty()) {
-    pollfd ready{runner.poll_fd(), POLLIN, 0};
-    ::poll(&ready, 1, static_cast<int>(runner.timeout_ms()));
-  }
-  const CommandOutcome& outcome = ended[0];
+  const CommandOutcome outcome = RunToItsEnd(&runner, words, timeout_ms);
   if (outcome.exit_code == 0) return outcome.error;
-  return Fail(outcome.timed_out ? ErrorCode::kTimeout : ErrorCode::kInvalidArgument,
-              "/executor: Slurm would not take a job: " + FailureOf(words[0], outcome));
+  const std::string trouble = FailureOf(words[0], outcome);
+  const Words status = commands->Status({}, {})[0].words;
+  const CommandOutcome answer = RunToItsEnd(&runner, status, timeout_ms);
+  if (outcome.exit_code < 0 || answer.exit_code != 0)
+    return Fail(ErrorCode::kIo, "/executor: Slurm cannot be asked at present: " + trouble);
+  return Fail(ErrorCode::kInvalidArgument, "/executor: Slurm would not take a job: " + trouble);
 }
 
 }  // namespace patina::daemon

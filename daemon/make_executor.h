@@ -20,8 +20,9 @@ Result<std::unique_ptr<Executor>> MakeExecutor(const Config& config,
                                                FileCalls& files, Clock& clock, Logger& log);
 
 // Asks Slurm whether it would take a job of the configuration's limits; submits nothing. The answer
-// is text to print, empty for other executors. Errors: kInvalidArgument (it would not, or the
-// arguments cannot be given), kTimeout, kIo.
+// is text to print, empty for other executors. Errors: kInvalidArgument (it would not, or its
+// arguments or templates are wrong), kIo (it does not answer; that says nothing about the
+// configuration).
 Result<std::string> AskFarm(const Config& config, Clock& clock);
 
 }  // namespace patina::daemon

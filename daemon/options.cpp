@@ -31,10 +31,14 @@ usage: patinad --watch DIR --out DIR [OPTION...]
       --cores N          Cores that all jobs together may use (default: all)
       --log-level LEVEL  debug, info (default), warning, error
       --log-format F     json (default), text
-      --check-config     Say all that is wrong with the configuration, and exit
+      --check-config     Say all that is wrong with the configuration, and exit; also asks Slurm, if
+                         that is the executor, whether it would take a job
       --print-config     Print the configuration in effect, and exit
   -h, --help
   -V, --version
+
+Jobs run on this machine, or on a farm: "executor" in the configuration, of the kind "slurm", or
+"command" for any that has programs to submit, list and cancel jobs.
 
 Flags come over environment (PATINA_WATCH=DIR:DIR, PATINA_OUT, PATINA_STATE_DIR, ...), and that
 over the file. $OCIO names the OpenColorIO configuration of jobs that name none. Signals: HUP reads

@@ -64,8 +64,8 @@ class Executor {
  public:
   virtual ~Executor() = default;
 
-  // Starts an attempt and returns a handle that finds it again after a crash of the daemon. An
-  // error means that nothing runs.
+  // Starts an attempt and returns a handle that finds it again after a crash of the daemon; empty
+  // if none is needed. An error means that nothing runs.
   virtual Result<std::string> Start(const AttemptSpec& spec) = 0;
   // Takes over an attempt of an earlier daemon; the handle may be empty if that died before it was
   // stored. True: from now on Poll reports on it, be it alive or ended. False: not known yet, ask

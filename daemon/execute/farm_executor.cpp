@@ -13,7 +13,7 @@
 namespace patina::daemon {
 namespace {
 
-constexpr int kSubmissionsAtOnce = 4;
+constexpr int kSubmissionsAtOnce = 8;
 constexpr int kCancelsAtOnce = 4;
 constexpr int kMostRefusals = 3;
 constexpr int kLooksAtOnce = 100;              // at files of attempts, in one Poll
@@ -44,7 +44,8 @@ class FarmExecutor : public Executor {
     FarmAttempt attempt(spec);
     attempt.phase = commands_->finds_names() ? FarmPhase::kLookUp : FarmPhase::kSubmit;
     Add(std::move(attempt));
-    return "farm:" + FarmNameOf(spec);
+    // It is found by its name, which follows from the attempt.
+    return std::string();
   }
 
   // What is not known yet, the next rounds tell: none of it is reported lost meanwhile.
@@ -227,13 +228,11 @@ class FarmExecutor : public Executor {
   }
 
   void ApplyRound() {
-    std::unordered_map<std::string, Key>::const_iterator found;
     std::map<Key, std::vector<FarmJob>> said;
     for (FarmJob& job : round_jobs_) {
-      if (found = by_id_.find(job.id); found == by_id_.end()) {
-        found = by_name_.find(job.name);
-        if (found == by_name_.end()) continue;
-      }
+      const auto& known = job.name.empty() ? by_id_ : by_name_;
+      const auto found = known.find(job.name.empty() ? job.id : job.name);
+      if (found == known.end()) continue;
       const FarmAttempt& attempt = attempts_.at(found->second);
       // Of another daemon that counts its jobs as this one does.
       if (!job.folder.empty() && job.folder != attempt.spec.folder) continue;

@@ -17,7 +17,7 @@ constexpr int64_t kStoreRetryMs = 1000;
 constexpr int64_t kMostStartWaitMs = 60000;
 constexpr int64_t kAdoptRetryMs = 50;
 constexpr int kCandidates = 64;
-constexpr int kStartsAtOnce = 64;  // in one step, so that much to start does not hold up the rest
+constexpr int kStartsAtOnce = 4;  // in one step, so that much to start does not hold up the rest
 
 std::string ShortText(const Json& json, const char* key, size_t max_bytes) {
   const auto found = json.find(key);
@@ -581,8 +581,10 @@ bool Scheduler::StartJob(const JobRecord& queued, int threads, const Config& con
                                   {"threads", threads},
                                   {"handle", *handle}});
   // Without a handle a later daemon finds it all the same, by its lock or its name.
-  const Status noted = parts_.store.SetHandle({job.id, job.attempt}, *handle);
-  if (!noted) StoreFailed("set_handle", noted.error());
+  if (!handle->empty()) {
+    const Status noted = parts_.store.SetHandle({job.id, job.attempt}, *handle);
+    if (!noted) StoreFailed("set_handle", noted.error());
+  }
   Active active;
   active.job = std::move(job);
   active.spec = std::move(spec);

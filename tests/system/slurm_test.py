@@ -280,6 +280,18 @@ def test_check_config_asks_slurm(arguments, _):
         assert said in answer.stdout + answer.stderr, (executor, answer)
 
 
+def test_check_config_only_warns_of_a_slurm_that_is_down(arguments, slurm):
+    slurm.stop_controller()
+    config = os.path.join(arguments.folder, "check.json")
+    with open(config, "w", encoding="utf-8") as file:
+        json.dump({"version": 1, "state_dir": "check", "out": "out", "executor": {"kind": "slurm"}}, file)
+    answer = subprocess.run([arguments.patinad, "--check-config", "--config", config], capture_output=True, text=True,
+                            check=False)
+    slurm.start_controller()
+    assert answer.returncode == 0, answer
+    assert "warning: /executor: Slurm cannot be asked" in answer.stderr, answer
+
+
 def fault_round(arguments, slurm, number):
     """Random faults while jobs run; then nothing is lost, and nothing was published twice."""
     chance = random.Random(number)

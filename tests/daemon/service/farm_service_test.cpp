@@ -49,7 +49,7 @@ TEST_F(ServiceOnFarm, StartsManyJobsInSteps) {
   for (int i = 0; i < 150; ++i) Submit("asset" + std::to_string(i));
   EXPECT_EQ(service_->Step(), 0) << "there is more to start";
   EXPECT_LT(executor_.running.size(), 150u);
-  for (int i = 0; i < 3; ++i) service_->Step();
+  for (int i = 0; i < 40; ++i) service_->Step();
   EXPECT_EQ(executor_.running.size(), 150u);
 }
 
