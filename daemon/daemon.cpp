@@ -52,7 +52,7 @@ int CheckConfig(const LoadedConfig& loaded) {
                  loaded.problems.size() == 1 ? "problem" : "problems");
     return kExitBadInput;
   }
-  auto answer = AskFarm(loaded.config, SystemClock());
+  auto answer = AskExecutor(loaded.config, SystemClock());
   if (answer) {
     std::fputs(answer->c_str(), stdout);
   } else {

@@ -50,6 +50,13 @@ SlurmOptions SlurmOptionsOf(const ExecutorConfig& executor) {
   return options;
 }
 
+LocalExecutorOptions::Sandbox SandboxOf(const Config& config) {
+  using Sandbox = LocalExecutorOptions::Sandbox;
+  return config.sandbox == SandboxMode::kOff       ? Sandbox::kOff
+         : config.sandbox == SandboxMode::kRequire ? Sandbox::kRequired
+                                                   : Sandbox::kIfPossible;
+}
+
 Result<std::unique_ptr<FarmCommands>> MakeCommands(const ExecutorConfig& executor) {
   if (executor.kind == ExecutorKind::kSlurm) {
     for (const std::string& argument : executor.sbatch_arguments) {
@@ -117,15 +124,15 @@ Result<std::unique_ptr<Executor>> MakeExecutor(const Config& config,
   options.environment = std::move(of_worker);
   if (color_config)
     options.read.push_back(std::filesystem::path(*color_config).parent_path().string());
-  using Sandbox = LocalExecutorOptions::Sandbox;
-  options.sandbox = config.sandbox == SandboxMode::kOff       ? Sandbox::kOff
-                    : config.sandbox == SandboxMode::kRequire ? Sandbox::kRequired
-                                                              : Sandbox::kIfPossible;
+  options.sandbox = SandboxOf(config);
   return MakeLocalExecutor(options, files, log);
 }
 
-Result<std::string> AskFarm(const Config& config, Clock& clock) {
-  if (!OnFarm(config)) return std::string();
+Result<std::string> AskExecutor(const Config& config, Clock& clock) {
+  if (!OnFarm(config)) {
+    PATINA_TRY(CheckSandbox(SandboxOf(config)));
+    return std::string();
+  }
   PATINA_ASSIGN(const std::unique_ptr<FarmCommands> commands, MakeCommands(config.executor));
   if (config.executor.kind != ExecutorKind::kSlurm) return std::string();
   PATINA_ASSIGN(CommandRunner runner, CommandRunner::Create(clock));

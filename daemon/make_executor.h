@@ -19,10 +19,11 @@ Result<std::unique_ptr<Executor>> MakeExecutor(const Config& config,
                                                const std::vector<std::string>& environment,
                                                FileCalls& files, Clock& clock, Logger& log);
 
-// Asks Slurm whether it would take a job of the configuration's limits; submits nothing. The answer
-// is text to print, empty for other executors. Errors: kInvalidArgument (it would not, or its
-// arguments or templates are wrong), kIo (it does not answer; that says nothing about the
+// Asks Slurm whether it would take a job of the configuration's limits, and submits nothing;
+// without a farm, whether the kernel has the sandbox that is required. The answer is text to print,
+// empty for other executors. Errors: kInvalidArgument (it would not, or its arguments or templates
+// are wrong), kUnsupported (no sandbox), kIo (it does not answer; that says nothing about the
 // configuration).
-Result<std::string> AskFarm(const Config& config, Clock& clock);
+Result<std::string> AskExecutor(const Config& config, Clock& clock);
 
 }  // namespace patina::daemon

@@ -66,12 +66,8 @@ class LocalExecutor : public Executor {
     if (inotify_) Listen(inotify_.get());
     if (options_.sandbox == LocalExecutorOptions::Sandbox::kOff) return {};
     use_sandbox_ = true;
+    PATINA_TRY(CheckSandbox(options_.sandbox));
     if (Sandbox::LandlockVersion() > 0) return {};
-    if (options_.sandbox == LocalExecutorOptions::Sandbox::kRequired) {
-      return Fail(ErrorCode::kUnsupported,
-                  "this kernel has no Landlock, and the configuration requires a sandbox; boot "
-                  "with lsm=...,landlock, or set \"sandbox\" to \"auto\"");
-    }
     log_.Warning("half_a_sandbox",
                  {{"reason",
                    "this kernel has no Landlock: jobs are kept from sockets and the like, "
@@ -297,6 +293,14 @@ class LocalExecutor : public Executor {
 };
 
 }  // namespace
+
+Status CheckSandbox(LocalExecutorOptions::Sandbox sandbox) {
+  if (sandbox != LocalExecutorOptions::Sandbox::kRequired || Sandbox::LandlockVersion() > 0)
+    return {};
+  return Fail(ErrorCode::kUnsupported,
+              "this kernel has no Landlock, and the configuration requires a sandbox; boot with "
+              "lsm=...,landlock, or set \"sandbox\" to \"auto\"");
+}
 
 Result<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorOptions& options,
                                                     FileCalls& files, Logger& log) {

@@ -27,6 +27,9 @@ struct LocalExecutorOptions {
   std::vector<std::string> read;         // files and folders that every child may read
 };
 
+// Errors: kUnsupported (it is required, and the kernel has no Landlock).
+Status CheckSandbox(LocalExecutorOptions::Sandbox sandbox);
+
 // Errors: kUnsupported (a sandbox is required and the kernel has none), kResourceExhausted. The
 // references must outlive it.
 Result<std::unique_ptr<Executor>> MakeLocalExecutor(const LocalExecutorOptions& options,
