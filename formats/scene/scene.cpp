@@ -151,18 +151,6 @@ void NameAssets(const std::string& scene_name, std::vector<SceneMaterial>* mater
   }
 }
 
-std::string SceneNameOf(const std::string& path) {
-  std::string name = fs::path(path).filename().string();
-  for (const std::string_view end : {".gltf", ".glb", ".patina.json"}) {
-    if (EndsWithAnyCase(name, end)) {
-      name.resize(name.size() - end.size());
-      break;
-    }
-  }
-  name = LegalName(name);
-  return name.empty() ? "scene" : name;
-}
-
 }  // namespace scene_detail
 
 const char* SceneWrapName(SceneWrap wrap) {
@@ -182,12 +170,24 @@ bool IsSceneFileName(const std::string& name) {
          EndsWithAnyCase(name, ".patina.json");
 }
 
+std::string SceneNameOf(const std::string& path) {
+  std::string name = fs::path(path).filename().string();
+  for (const std::string_view end : {".gltf", ".glb", ".patina.json"}) {
+    if (EndsWithAnyCase(name, end)) {
+      name.resize(name.size() - end.size());
+      break;
+    }
+  }
+  name = LegalName(name);
+  return name.empty() ? "scene" : name;
+}
+
 Result<Scene> ReadScene(const std::string& path) {
   Result<Scene> scene = EndsWithAnyCase(path, ".patina.json") ? scene_detail::ReadSceneFile(path)
                                                               : scene_detail::ReadGltf(path);
   if (!scene) return scene;
   scene->path = path;
-  scene->name = scene_detail::SceneNameOf(path);
+  scene->name = SceneNameOf(path);
   const std::string file = fs::path(path).filename().string();
   for (SceneMaterial& material : scene->materials) material.look.file = file;
   scene_detail::NameAssets(scene->name, &scene->materials);

@@ -26,9 +26,6 @@ std::string NotAnImageText(const uint8_t* bytes, size_t size);
 // Makes asset names of the materials' names: legal, and each once.
 void NameAssets(const std::string& scene_name, std::vector<SceneMaterial>* materials);
 
-// The file's name without folder and extensions, as an asset name.
-std::string SceneNameOf(const std::string& path);
-
 Result<Scene> ReadGltf(const std::string& path);
 Result<Scene> ReadSceneFile(const std::string& path);
 

@@ -9,6 +9,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/layered/layered_file.h"
+#include "formats/scene/scene.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/result_text.h"
 #include "pipeline/jobs/brdf_group.h"
@@ -212,9 +213,20 @@ std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
   KeepChosenMaterials(options.materials, &plan);
   if (options.as_svbrdf) BakeSetsAsReflectance(&plan);
   std::set<std::string> taken;
+  std::map<std::string, std::string> described;  // where a scene's manifest comes, and whose it is
   for (PlannedJob& planned : plan) {
     if (!planned.job) continue;
     Apply(options.job, &*planned.job);
+    if (const std::string scene = planned.job->scene; !scene.empty()) {
+      const std::string manifest = planned.job->out + "/" + SceneNameOf(scene) + ".scene.json";
+      const auto [first, is_new] = described.emplace(manifest, scene);
+      if (!is_new && first->second != scene) {
+        planned.job = Fail(ErrorCode::kConflict, scene + " and " + first->second +
+                                                     " would both be described in " + manifest +
+                                                     "; rename one, or bake it into another --out");
+        continue;
+      }
+    }
     if (planned.job->out.empty()) {
       planned.job =
           Fail(ErrorCode::kInvalidArgument, "no folder for the container; give --out DIR");

@@ -132,6 +132,15 @@ TEST_F(Scenes, InAFolderOwnTheirTextures) {
   EXPECT_EQ(manifest["lod_range"], (Json{0, 3}));  // 32 texels on 2 m at 2 to 16 pixels a metre
 }
 
+TEST_F(Scenes, OfOneNameDoNotDescribeThemselvesInOneFile) {
+  fs::copy_file(folder_ / "in/mosaic.gltf", folder_ / "in/mosaic.GLTF");
+  const Outcome baked = Bake({folder_ / "in/mosaic.gltf", folder_ / "in/mosaic.GLTF", "--material",
+                              "brass", "--out", folder_ / "out"});
+  EXPECT_EQ(baked.exit_code, 1);
+  EXPECT_THAT(baked.err, HasSubstr("would both be described in"));
+  EXPECT_EQ(Read("out/mosaic.scene.json")["file"], "mosaic.gltf");
+}
+
 TEST_F(Scenes, BakeTheSameFromAJobFileAndTwice) {
   const Json job = {{"version", 1},
                     {"kind", "material"},
