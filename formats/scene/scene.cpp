@@ -10,6 +10,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/base/names.h"
+#include "formats/scene/scene_name.h"
 #include "formats/scene/scene_reading.h"
 
 namespace patina {

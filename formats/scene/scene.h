@@ -138,9 +138,6 @@ struct Scene {
 // Whether the name is that of a scene: *.gltf, *.glb (in any case), *.patina.json.
 bool IsSceneFileName(const std::string& name);
 
-// Scene::name of a file: its own without folder and extensions, as an asset name.
-std::string SceneNameOf(const std::string& path);
-
 // Errors, with file and JSON pointer, of the scene as a whole: kNotFound, kIo, kOutOfRange (sizes
 // and counts above the limits), kCorruptData (not JSON or not a .glb, wrong types), kUnsupported
 // (not glTF 2.x, a required extension that is not known, a newer scene file).

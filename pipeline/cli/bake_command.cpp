@@ -9,7 +9,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/layered/layered_file.h"
-#include "formats/scene/scene.h"
+#include "formats/scene/scene_name.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/result_text.h"
 #include "pipeline/jobs/brdf_group.h"

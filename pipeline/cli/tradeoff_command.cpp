@@ -45,8 +45,8 @@ bool AnyOfBrdfs(const TradeoffOptions& o) {
 }
 
 std::vector<Variant> VariantsOf(const TradeoffOptions& options, JobKind kind) {
-  const bool asked = AnyOfBoth(options) || (kind == JobKind::kMaterial ? AnyOfMaterials(options)
-                                                                       : AnyOfBrdfs(options));
+  const bool asked = AnyOfBoth(options) ||
+                     (kind == JobKind::kMaterial ? AnyOfMaterials(options) : AnyOfBrdfs(options));
   if (asked) return ProductOf(AxesOf(options), kind);
   return kind == JobKind::kMaterial ? ProductOf(DefaultMaterialAxes(), kind)
                                     : DefaultBrdfVariants();
@@ -80,8 +80,9 @@ void PrintMeans(const std::vector<SweepRow>& means) {
     if (row.front_bytes) fronts += " bytes";
     if (row.front_decode) fronts += " decode";
     std::printf("  %-44s %6.2f dB %8s %10s %7.1f ns%s\n", row.variant.c_str(), row.quality_db,
-                DurationText(row.encode_s).c_str(), BytesText(static_cast<double>(row.bytes)).c_str(),
-                row.decode_ns, fronts.empty() ? "" : ("   best for:" + fronts).c_str());
+                DurationText(row.encode_s).c_str(),
+                BytesText(static_cast<double>(row.bytes)).c_str(), row.decode_ns,
+                fronts.empty() ? "" : ("   best for:" + fronts).c_str());
   }
 }
 
@@ -100,13 +101,15 @@ int TradeoffCommand(const CommandLine& line, const CancelToken& cancel) {
         continue;
       }
       if (!taken.insert(planned.asset).second) {
-        PrintError(planned.asset + ": another input is also named so; rename one, or sweep it into "
-                                   "another --out");
+        PrintError(planned.asset +
+                   ": another input is also named so; rename one, or sweep it into "
+                   "another --out");
         worst = kExitBadInput;
         continue;
       }
       if (planned.job->kind == JobKind::kSvbrdf) {
-        PrintError(planned.asset + ": is a set of images, of which no variants are baked; give " +
+        PrintError(planned.asset +
+                   ": is a spatially varying BRDF, of which no variants are baked; give " +
                    "texture sets or BRDF files");
         continue;
       }
@@ -127,9 +130,9 @@ int TradeoffCommand(const CommandLine& line, const CancelToken& cancel) {
   std::vector<SweepRow> rows;
   for (const auto& [jobs, variants] : kinds) {
     if (jobs->empty()) continue;
-    std::vector<SweepRow> more =
-        Sweep(*jobs, variants, options.out,
-              [&](const std::string& label) -> JobObserver& { return observers.For(label); }, cancel);
+    std::vector<SweepRow> more = Sweep(
+        *jobs, variants, options.out,
+        [&](const std::string& label) -> JobObserver& { return observers.For(label); }, cancel);
     rows.insert(rows.end(), std::make_move_iterator(more.begin()),
                 std::make_move_iterator(more.end()));
   }
@@ -147,10 +150,9 @@ int TradeoffCommand(const CommandLine& line, const CancelToken& cancel) {
     worst = kExitFailed;
   }
   const std::vector<SweepRow> means = MeansOf(rows);
-  const std::pair<const char*, std::string> files[] = {
-      {"tradeoff.csv", SweepCsv(rows, means)},
-      {"tradeoff.json", SweepJson(rows, means)},
-      {"tradeoff.html", SweepPage(rows, means)}};
+  const std::pair<const char*, std::string> files[] = {{"tradeoff.csv", SweepCsv(rows, means)},
+                                                       {"tradeoff.json", SweepJson(rows, means)},
+                                                       {"tradeoff.html", SweepPage(rows, means)}};
   for (const auto& [name, text] : files) {
     const Status written = WriteFileDurably(options.out + "/" + name, std::string_view(text));
     if (!written) return FailCommand(written.error());

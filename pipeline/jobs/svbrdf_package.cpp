@@ -17,6 +17,27 @@ using Json = nlohmann::ordered_json;
 
 std::string FeatureName(int texture) { return "features_" + std::to_string(texture) + ".dds"; }
 
+// What of a model with maps was not learned. Of layers the list of their simulation says the rest.
+std::vector<ManifestEffect> EffectsOf(const SvbrdfSource& source, const brdf::GridShape& grid) {
+  std::vector<ManifestEffect> effects;
+  if (source.format == kTextureSetFormat) {
+    for (const std::string& role : source.left_out)
+      effects.push_back({role, "left_out", "it is no part of the reflectance", std::nullopt});
+  }
+  if (grid.isotropic) {
+    effects.push_back({"azimuth", "left_out", "no texel has one", std::nullopt});
+  } else {
+    effects.push_back({"azimuth", "learned", "", std::nullopt});
+  }
+  if (grid.canonical_order) {
+    effects.push_back(
+        {"f(wo, wi)", "derived", "it is f(wi, wo): the directions are put in order", std::nullopt});
+  } else {
+    effects.push_back({"f(wo, wi)", "learned", "", std::nullopt});
+  }
+  return effects;
+}
+
 }  // namespace
 
 Status AddSvbrdfModel(const svbrdf::TrainedSvbrdf& model, StagingArea* staging) {
@@ -54,6 +75,7 @@ Manifest DescribeSvbrdf(const Job& job, const SvbrdfSource& source,
     model.simulation = ManifestSimulation{cost.pairs, cost.paths, cost.standard_error,
                                           source.effects, source.left_out};
   }
+  if (source.images == 0) manifest.effects = EffectsOf(source, shape.model.grid);
   DescribeBrdfModel(shape.model, texture.features(), &model);
   manifest.brdf = std::move(model);
   return manifest;

@@ -1,10 +1,14 @@
-// A synthetic BTF as a spatially varying neural BRDF: renders of a plane and a sphere against the
-// surface that it was made from, with the neural texture as BC6H blocks and as uncompressed halves;
-// bytes, compression ratio, cost of learning and of decoding. In the manner of Dou 2023, figures 8
-// to 10.
+// A synthetic BTF, a layered material with maps or a texture set as a spatially varying neural
+// BRDF: renders of a plane and a sphere against the surface that it was made from, with the neural
+// texture as BC6H blocks and as uncompressed halves; bytes, compression ratio, cost of learning and
+// of decoding. In the manner of Dou 2023, figures 8 to 10.
 //
-//   patina_svbrdf_bench [--size 128] [--images 2500] [--textures 4] [--steps-scale 1] [--seed 1]
+//   patina_svbrdf_bench [--source btf|layers|set] [--size 128] [--images 2500] [--textures 4]
+//   [--steps-scale 1] [--seed 1]
 //                       [--threads 0] [--out DIR]
+//
+// layers: also the paths for each place and pair of directions with which a simulated plane is as
+// good as the learned one, and their time over that of decoding.
 //
 // Times of one program on one machine: what counts are their ratios. DIR gets the renders.
 #include <algorithm>
@@ -20,14 +24,20 @@
 #include "formats/dds.h"
 #include "formats/half.h"
 #include "formats/index_pack.h"
+#include "formats/layered/varying_stack.h"
 #include "formats/weights.h"
 #include "pipeline/base/cpu_time.h"
 #include "pipeline/brdf/batch_evaluator.h"
+#include "pipeline/brdf/sphere_render.h"
 #include "pipeline/color/color.h"
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/sample_btf.h"
+#include "pipeline/jobs/sample_set.h"
+#include "pipeline/jobs/sample_stack.h"
 #include "pipeline/jobs/sheet.h"
-#include "pipeline/svbrdf/image_set_source.h"
+#include "pipeline/jobs/svbrdf_source.h"
+#include "pipeline/svbrdf/modelled_source.h"
+#include "pipeline/svbrdf/stack_model.h"
 #include "pipeline/svbrdf/train_svbrdf.h"
 
 namespace patina {
@@ -40,6 +50,7 @@ struct Arguments {
   int size = 128, images = 2500, textures = 4, threads = 0;
   double steps_scale = 1;
   uint64_t seed = 1;
+  std::string source = "btf";
   std::string out;
 };
 
@@ -199,7 +210,7 @@ struct System {
   svbrdf::TextureForm form;
   double wall_s = 0, cpu_s = 0, decode_ns = 0;
   uint64_t texture_bytes = 0, bytes = 0;
-  std::vector<double> mse = {};  // of each view
+  std::vector<double> mse = {}, ssim = {};  // of each view
   std::vector<std::vector<float>> images = {};
 };
 
@@ -229,60 +240,125 @@ class Runner {
   explicit Runner(const Arguments& arguments) : arguments_(arguments), pool_(arguments.threads) {}
 
   void Run() {
-    MakeSet();
+    MakeSource();
     constexpr int kPlaneSide = kSheetTile, kSphereSide = kSheetTile;
     views_ = {PlaneView(kPlaneSide, arguments_.size), SphereView(kSphereSide, arguments_.size)};
-    const SampleBtf btf(arguments_.seed);
-    for (const View& view : views_) {
-      std::vector<float> f(3 * view.shades.size());
-      pool_.ParallelFor(static_cast<int>((view.shades.size() + 1023) / 1024), [&](int task, int) {
-        const size_t first = static_cast<size_t>(task) * 1024;
-        for (size_t s = first; s < std::min(first + 1024, view.shades.size()); ++s) {
-          const Shade& shade = view.shades[s];
-          btf.Evaluate(static_cast<double>(shade.u), static_cast<double>(shade.v), shade.wi,
-                       shade.wo, f.data() + 3 * s);
-        }
-      });
-      truth_.push_back(Compose(view, f));
-    }
+    for (const View& view : views_) truth_.push_back(Compose(view, TruthOf(view)));
     std::vector<System> systems = {{"BC6H blocks", svbrdf::TextureForm::kBlocks},
                                    {"halves", svbrdf::TextureForm::kHalves}};
     for (System& system : systems) RunSystem(&system);
     Print(systems);
+    if (stack_ != nullptr) PrintSpeedup(systems[0]);
     if (!arguments_.out.empty()) WriteSheets(systems);
     std::filesystem::remove_all(set_folder_);
   }
 
  private:
-  void MakeSet() {
+  void MakeSource() {
     std::string pattern =
         (std::filesystem::temp_directory_path() / "patina-svbrdf-XXXXXX").string();
     if (mkdtemp(pattern.data()) == nullptr) Die("cannot make a temporary folder");
     set_folder_ = pattern;
     SetImageIoThreads(1);
-    const auto paths =
-        Must(WriteSampleBtf(set_folder_, {arguments_.size, arguments_.images, arguments_.seed},
-                            pool_, CancelToken(), NoProgress()));
-    set_ = Must(svbrdf::ReadImageSet(paths[0]));
-    shape_ = svbrdf::DefaultSvbrdfShape(set_.width, set_.height, set_.address);
+    Job job;
+    job.kind = JobKind::kSvbrdf;
+    job.seed = arguments_.seed;
+    if (arguments_.source == "btf") {
+      const auto paths =
+          Must(WriteSampleBtf(set_folder_, {arguments_.size, arguments_.images, arguments_.seed},
+                              pool_, CancelToken(), NoProgress()));
+      job.file = paths[0];
+    } else if (arguments_.source == "layers") {
+      job.file = Must(WriteSampleStack(set_folder_, arguments_.size, arguments_.seed))[0];
+      const auto stack = Must(layered::ReadVaryingStack(job.file));
+      stack_ = Must(svbrdf::StackModel::Load(stack, job.file, {}, pool_));
+    } else {
+      Must(WriteSampleSet(set_folder_, arguments_.size, arguments_.seed, pool_));
+      job.folder = set_folder_;
+    }
+    source_ = Must(ReadSvbrdfSource(job, pool_, CancelToken(), NoProgress()));
+    const svbrdf::VaryingSource& texels = *source_.texels;
+    shape_ = svbrdf::DefaultSvbrdfShape(texels.width(), texels.height(), texels.address(),
+                                        texels.isotropic());
     shape_.texture.textures = arguments_.textures;
     options_.seed = arguments_.seed;
     for (int* steps : {&options_.free_steps, &options_.block_steps, &options_.final_steps})
       *steps = std::max(1, static_cast<int>(*steps * arguments_.steps_scale));
     svbrdf::TexelPoolOptions drawing;
-    drawing.count = WantedSamples(options_, shape_.texture, svbrdf::ImageSetSource(set_));
+    drawing.count = WantedSamples(options_, shape_.texture, texels);
     drawing.levels = shape_.texture.levels;
+    drawing.features = shape_.texture.features();
     drawing.grid = shape_.model.grid;
     drawing.seed = arguments_.seed;
     const Clock::time_point start = Clock::now();
     const double start_cpu = ProcessCpuSeconds();
-    texels_ = Must(DrawTexels(set_, drawing, pool_));
+    texels_ = Must(texels.Draw(drawing, pool_));
+    std::printf("%s; drawing %.2f M samples: %.1f s, %.1f s of CPU time\n", source_.found.c_str(),
+                1e-6 * static_cast<double>(texels_.samples.size()), Since(start),
+                ProcessCpuSeconds() - start_cpu);
+  }
+
+  // f of each shade, of simulated ones the mean of many paths.
+  std::vector<float> TruthOf(const View& view) {
+    return arguments_.source == "btf" ? OfSurface(view) : OfModel(view, {0.005, 64, 64, 4096}, 1);
+  }
+
+  std::vector<float> OfSurface(const View& view) {
+    const SampleBtf btf(arguments_.seed);
+    std::vector<float> f(3 * view.shades.size());
+    ForShades(view, [&](size_t s, const Shade& shade) {
+      btf.Evaluate(static_cast<double>(shade.u), static_cast<double>(shade.v), shade.wi, shade.wo,
+                   f.data() + 3 * s);
+    });
+    return f;
+  }
+
+  std::vector<float> OfModel(const View& view, const layered::Accuracy& accuracy, uint64_t seed) {
+    const auto& model = static_cast<const svbrdf::ModelledSource&>(*source_.texels);
+    const svbrdf::FootprintFinder finder = model.Finder(1);
+    std::vector<float> f(3 * view.shades.size());
+    ForShades(view, [&](size_t s, const Shade& shade) {
+      Rng rng(seed, s);
+      const auto estimate = model.Estimate(finder, model.FootprintAt(finder, shade.u, shade.v, 0),
+                                           shade.wi, shade.wo, accuracy, &rng);
+      for (size_t c = 0; c < 3; ++c) f[3 * s + c] = static_cast<float>(estimate.f[c]);
+    });
+    return f;
+  }
+
+  template <class Visit>
+  void ForShades(const View& view, Visit&& visit) {
+    pool_.ParallelFor(static_cast<int>((view.shades.size() + 1023) / 1024), [&](int task, int) {
+      const size_t first = static_cast<size_t>(task) * 1024;
+      for (size_t s = first; s < std::min(first + 1024, view.shades.size()); ++s)
+        visit(s, view.shades[s]);
+    });
+  }
+
+  // The error of a simulated picture falls as one over its paths.
+  void PrintSpeedup(const System& learned) {
+    constexpr int kPaths = 32;
+    const View& plane = views_[0];
+    std::vector<float> f(3 * plane.shades.size());
+    double cpu_s = 0;
+    const auto size = static_cast<size_t>(arguments_.size);
+    const double start = ProcessCpuSeconds();
+    ForShades(plane, [&](size_t s, const Shade& shade) {
+      Rng rng(77, s);
+      double sum[3] = {0, 0, 0}, squares[3] = {0, 0, 0};
+      const auto x = static_cast<size_t>(shade.u * static_cast<float>(size)),
+                 y = static_cast<size_t>(shade.v * static_cast<float>(size));
+      stack_->AddDraws(y * size + x, shade.wi, shade.wo, kPaths, &rng, sum, squares);
+      for (size_t c = 0; c < 3; ++c) f[3 * s + c] = static_cast<float>(sum[c] / kPaths);
+    });
+    cpu_s = ProcessCpuSeconds() - start;
+    const double mse = Mse(plane, truth_[0], Compose(plane, f));
+    const double ns_path = 1e9 * cpu_s / static_cast<double>(plane.shades.size()) / kPaths;
+    const double paths = kPaths * mse / learned.mse[0];
     std::printf(
-        "%zu images of %d x %d; reading them and drawing %.1f M samples: %.1f s, %.1f s of "
-        "CPU time\n",
-        set_.images.size(), set_.width, set_.height,
-        1e-6 * static_cast<double>(texels_.samples.size()), Since(start),
-        ProcessCpuSeconds() - start_cpu);
+        "simulating the plane: MSE %.7f with %d paths; as good as learned with %.0f, at %.0f ns "
+        "each: %.0f times the time of decoding\n",
+        mse, kPaths, paths, ns_path, paths * ns_path / learned.decode_ns);
   }
 
   void RunSystem(System* system) {
@@ -334,21 +410,35 @@ class Runner {
       system->decode_ns = 1e9 * seconds[kRounds / 2] / static_cast<double>(count);
       system->images.push_back(Compose(view, f));
       system->mse.push_back(Mse(view, truth_[v], system->images.back()));
+      system->ssim.push_back(Ssim(view, truth_[v], system->images.back()));
     }
   }
 
+  double Ssim(const View& view, const std::vector<float>& a, const std::vector<float>& b) {
+    brdf::SphereImage wanted{view.side, a, {}}, learned{view.side, b, {}};
+    wanted.inside.assign(static_cast<size_t>(view.side) * view.side, 0);
+    for (const Shade& shade : view.shades) wanted.inside[static_cast<size_t>(shade.pixel)] = 1;
+    learned.inside = wanted.inside;
+    return brdf::CompareSpheres(wanted, learned, pool_).ssim;
+  }
+
   void Print(const std::vector<System>& systems) const {
-    const double raw = 6.0 * set_.width * set_.height * static_cast<double>(set_.images.size());
-    std::printf("the images as halves: %.1f MB\n\n", 1e-6 * raw);
+    const double raw = 6.0 * shape_.texture.width * shape_.texture.height *
+                       static_cast<double>(source_.images);  // none of maps: no ratio
+    if (source_.images > 0) std::printf("the images as halves: %.1f MB\n\n", 1e-6 * raw);
     std::printf(
-        "| texture | plane MSE | dB | sphere MSE | dB | texture kB | all kB | ratio | "
-        "training s | CPU s | ns/decode |\n|---|---|---|---|---|---|---|---|---|---|---|\n");
+        "| texture | plane MSE | dB | SSIM | sphere MSE | dB | SSIM | texture kB | all kB | ratio "
+        "| "
+        "training s | CPU s | ns/decode "
+        "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (const System& system : systems) {
-      std::printf("| %s | %.6f | %.2f | %.6f | %.2f | %.1f | %.1f | %.0f | %.0f | %.0f | %.0f |\n",
-                  system.name, system.mse[0], Decibels(system.mse[0]), system.mse[1],
-                  Decibels(system.mse[1]), 1e-3 * static_cast<double>(system.texture_bytes),
-                  1e-3 * static_cast<double>(system.bytes), raw / static_cast<double>(system.bytes),
-                  system.wall_s, system.cpu_s, system.decode_ns);
+      std::printf(
+          "| %s | %.6f | %.2f | %.4f | %.6f | %.2f | %.4f | %.1f | %.1f | %.0f | %.0f | %.0f | "
+          "%.0f |\n",
+          system.name, system.mse[0], Decibels(system.mse[0]), system.ssim[0], system.mse[1],
+          Decibels(system.mse[1]), system.ssim[1], 1e-3 * static_cast<double>(system.texture_bytes),
+          1e-3 * static_cast<double>(system.bytes), raw / static_cast<double>(system.bytes),
+          system.wall_s, system.cpu_s, system.decode_ns);
     }
     const System &blocks = systems[0], &halves = systems[1];
     std::printf(
@@ -385,7 +475,8 @@ class Runner {
   Arguments arguments_;
   ThreadPool pool_;
   std::string set_folder_;
-  svbrdf::ImageSet set_;
+  SvbrdfSource source_;
+  std::shared_ptr<const svbrdf::StackModel> stack_;  // of a layered material
   svbrdf::SvbrdfShape shape_;
   svbrdf::SvbrdfOptions options_;
   svbrdf::TexelPool texels_;
@@ -404,6 +495,10 @@ int main(int argc, char** argv) {
     const std::string value = argv[++i];
     if (name == "--size") {
       arguments.size = std::clamp(std::atoi(value.c_str()), 4, patina::kMaxSampleBtfSide);
+    } else if (name == "--source") {
+      if (value != "btf" && value != "layers" && value != "set")
+        patina::Die("--source: " + value + " is not one of btf, layers, set");
+      arguments.source = value;
     } else if (name == "--images") {
       arguments.images = std::clamp(std::atoi(value.c_str()), 1, patina::kMaxSampleBtfImages);
     } else if (name == "--textures") {

@@ -220,7 +220,8 @@ TEST_F(BakedMaps, LayersAreSimulatedAtEachTexel) {
             Json::array({"rough refraction", "absorption", "colour"}));
   EXPECT_TRUE(manifest["brdf"]["isotropic"] && manifest["brdf"]["canonical_order"]);
   EXPECT_THAT(Patina({"info", folder_ / "out/maps"}).out,
-              AllOf(HasSubstr("maps of 16 x 16 texels"), HasSubstr("simulated")));
+              AllOf(HasSubstr("maps of 16 x 16 texels"), HasSubstr("simulated"),
+                    HasSubstr("no texel has one")));
   EXPECT_THAT(ReadAll(folder_ / "out/maps/current/report.html"),
               AllOf(HasSubstr("Three of 64 pairs"), HasSubstr("rough refraction")));
   const Outcome valid =
@@ -253,6 +254,8 @@ TEST_F(BakedMaps, ATextureSetBecomesReflectance) {
   const Json manifest = Manifest();
   EXPECT_EQ(manifest["source"]["format"], "texture_set");
   EXPECT_EQ(manifest["source"]["images"]["address"], "clamp");
+  EXPECT_EQ(manifest["effects"][0]["what"], "ao");
+  EXPECT_EQ(manifest["effects"][0]["state"], "left_out");
   EXPECT_FALSE(manifest["brdf"]["isotropic"]);
   EXPECT_GT(manifest["quality"]["image_ssim"], 0.5);
   const Outcome valid =
