@@ -300,7 +300,7 @@ class Runner {
 
   // f of each shade, of simulated ones the mean of many paths.
   std::vector<float> TruthOf(const View& view) {
-    return arguments_.source == "btf" ? OfSurface(view) : OfModel(view, {0.005, 64, 64, 4096}, 1);
+    return arguments_.source == "btf" ? OfSurface(view) : OfModel(view, {0.02, 32, 64, 1024}, 1);
   }
 
   std::vector<float> OfSurface(const View& view) {
@@ -399,12 +399,12 @@ class Runner {
       constexpr int kRounds = 7;
       std::vector<double> seconds;
       for (int round = 0; round < kRounds; ++round) {
-        const Clock::time_point begin = Clock::now();
+        const double begin = ProcessCpuSeconds();  // of this one thread
         for (size_t s = 0; s < count; ++s)
           taps[s] = places.LookUp(view.shades[s].u, view.shades[s].v, 0);
         evaluator.Evaluate(&scratch, count, wi.data(), wo.data(), f.data(), texture.data(),
                            taps.data());
-        seconds.push_back(Since(begin));
+        seconds.push_back(ProcessCpuSeconds() - begin);
       }
       std::nth_element(seconds.begin(), seconds.begin() + kRounds / 2, seconds.end());
       system->decode_ns = 1e9 * seconds[kRounds / 2] / static_cast<double>(count);
