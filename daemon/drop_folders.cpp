@@ -38,7 +38,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
     for (const WatchConfig& watch : config.watch) {
       WatchOptions options;
       options.root = watch.path;
-      options.exclude = {config.out, config.state_dir};
+      options.exclude = {config.out, config.state_dir, WorkFolderOf(config)};
       options.exclude.insert(options.exclude.end(), config.output_roots.begin(),
                              config.output_roots.end());
       if (!config.failed_dir.empty()) options.exclude.push_back(config.failed_dir);

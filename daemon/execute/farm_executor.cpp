@@ -18,6 +18,7 @@ constexpr int kCancelsAtOnce = 4;
 constexpr int kMostRefusals = 3;
 constexpr int kLooksAtOnce = 100;              // at files of attempts, in one Poll
 constexpr int64_t kMsPerLook = 2;              // so that 10,000 of them are seen in 20 s
+constexpr int64_t kWaitingShare = 8;           // so much seldomer, while a job waits
 constexpr int64_t kLookUpMs = 250;             // between rounds that submissions wait for
 constexpr int64_t kResultLookMs = 250;         // between looks for a result that is due
 constexpr int64_t kCancelAgainMs = 10000;      // if it is still there then
@@ -269,6 +270,7 @@ class FarmExecutor : public Executor {
     attempt->phase = FarmPhase::kOnFarm;
     attempt->asked_farm = true;
     attempt->confirmed = true;
+    if (attempt->last.state != best->state) attempt->next_look_ms = 0;
     attempt->last = *best;
     std::string text = "job " + best->id;
     if (best->state == FarmState::kWaiting) {
@@ -422,7 +424,10 @@ class FarmExecutor : public Executor {
       if (LooksAtFiles(attempt) && now >= attempt.next_look_ms) {
         ++looks;
         const bool ending = attempt.phase == FarmPhase::kEnding;
-        attempt.next_look_ms = now + (ending ? std::min(options_.poll_ms, kResultLookMs) : between);
+        // One that waits may have begun since the farm last answered, but that is rare.
+        const int64_t patience = attempt.last.state == FarmState::kWaiting ? kWaitingShare : 1;
+        attempt.next_look_ms =
+            now + (ending ? std::min(options_.poll_ms, kResultLookMs) : between * patience);
         ended = LookAt(&attempt);
       } else if (!attempt.events.empty()) {
         ReportEvents(&attempt);

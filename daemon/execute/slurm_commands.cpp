@@ -185,7 +185,7 @@ std::optional<std::string> SlurmOwnOption(const std::string& argument) {
   if (name.size() > 2 && name.rfind("--", 0) == 0) {
     // sbatch takes any beginning that is not ambiguous.
     for (const std::string_view own : kLong) {
-      if (name == own) return name;
+      if (own.rfind(name, 0) == 0) return name;
     }
     return std::nullopt;
   }

@@ -74,9 +74,10 @@ TEST(SlurmCommands, ReadIdsOnly) {
 
 TEST(SlurmCommands, TakeNoArgumentsThatWouldBreakTheirOwn) {
   for (const char* bad : {"--array=1-3", "-a1-3", "-J", "--job-name=x", "--requeue", "--wrap=true",
-                          "script.sh", "", "-M", "--clusters=x", "--time=1"})
+                          "--arr=1-3", "script.sh", "", "-M", "--clusters=x", "--time=1"})
     EXPECT_TRUE(SlurmOwnOption(bad)) << bad;
-  for (const char* good : {"--constraint=avx2", "--reservation=r", "-Cavx2", "--gres=gpu:1"})
+  for (const char* good : {"--constraint=avx2", "--reservation=r", "--exclusive", "--time-min=5",
+                           "-Cavx2", "--gres=gpu:1"})
     EXPECT_FALSE(SlurmOwnOption(good)) << good;
 }
 
