@@ -95,11 +95,19 @@ std::string Joined(const std::vector<std::string>& names) {
   return text.empty() ? "none" : text;
 }
 
+// What a BRDF was baked from, as people call it.
+std::string OriginText(const ManifestBrdf& brdf) {
+  if (brdf.source_format == "texture_set") return "a texture set";
+  if (brdf.source_format == "image_set") return "measured images";
+  if (brdf.source_format == "layered") return brdf.images ? "layers with maps" : "layers";
+  return "a file of format " + brdf.source_format;
+}
+
 std::string BrdfText(const Manifest& m) {
   const ManifestBrdf& brdf = *m.brdf;
   std::string text =
-      Format("  %s from a file of format %s, %s, quality %s, recipe %s %d, seed %llu\n",
-             brdf.images ? "spatially varying BRDF" : "BRDF", brdf.source_format.c_str(),
+      Format("  %s from %s, %s, quality %s, recipe %s %d, seed %llu\n",
+             brdf.images ? "spatially varying BRDF" : "BRDF", OriginText(brdf).c_str(),
              brdf.isotropic ? "isotropic" : "anisotropic", m.quality_setting.c_str(),
              m.tool.recipe.c_str(), m.tool.recipe_version, static_cast<unsigned long long>(m.seed));
   text += "\nQuality\n";
