@@ -136,7 +136,7 @@ TEST_F(Scenes, OfOneNameDoNotDescribeThemselvesInOneFile) {
   fs::copy_file(folder_ / "in/mosaic.gltf", folder_ / "in/mosaic.GLTF");
   const Outcome baked = Bake({folder_ / "in/mosaic.gltf", folder_ / "in/mosaic.GLTF", "--material",
                               "brass", "--out", folder_ / "out"});
-  EXPECT_EQ(baked.exit_code, 1);
+  EXPECT_EQ(baked.exit_code, 3);
   EXPECT_THAT(baked.err, HasSubstr("would both be described in"));
   EXPECT_EQ(Read("out/mosaic.scene.json")["file"], "mosaic.gltf");
 }
