@@ -17,7 +17,7 @@ namespace patina::layered {
 
 // Reflectance of a dielectric for unpolarised light; 1 beyond the critical angle, exactly 0 for eta
 // of 1. cos_t: the cosine in the other medium, 0 beyond the critical angle.
-inline double FresnelDielectric(double cos_w, double eta, double* cos_t) {
+PATINA_HOT inline double FresnelDielectric(double cos_w, double eta, double* cos_t) {
   const double square = 1 - (1 - cos_w * cos_w) / (eta * eta);
   if (!(square > 0)) {
     *cos_t = 0;
@@ -50,18 +50,18 @@ inline double FresnelConductor(double cosine, double eta, double k) {
 struct Ggx {
   double x = 1, y = 1;  // alpha
 
-  double Density(const Vec& m) const {
+  PATINA_HOT double Density(const Vec& m) const {
     const double mx = m.x / x, my = m.y / y;
     const double sum = mx * mx + my * my + m.z * m.z;
     return 1 / (kPi * x * y * sum * sum);
   }
-  double Lambda(const Vec& w) const {
+  PATINA_HOT double Lambda(const Vec& w) const {
     const double wx = x * w.x, wy = y * w.y;
     return 0.5 * (std::sqrt(1 + (wx * wx + wy * wy) / (w.z * w.z)) - 1);
   }
-  double Masking(const Vec& w) const { return 1 / (1 + Lambda(w)); }
+  PATINA_HOT double Masking(const Vec& w) const { return 1 / (1 + Lambda(w)); }
   // A normal that is seen from w, with density Masking(w) Density(m) max(0, w.m) / w.z.
-  Vec SampleVisible(const Vec& w, double u0, double u1) const {
+  PATINA_HOT Vec SampleVisible(const Vec& w, double u0, double u1) const {
     const Vec s = Normalized({x * w.x, y * w.y, w.z});
     double sine, cosine;
     SinCosTurns(u0, &sine, &cosine);
@@ -78,7 +78,7 @@ struct FacetReflection {
   double value = 0, pdf = 0;
   double cosine = 1;  // between w and the facet
 };
-inline FacetReflection EvaluateReflection(const Ggx& ggx, const Vec& w, const Vec& r) {
+PATINA_HOT inline FacetReflection EvaluateReflection(const Ggx& ggx, const Vec& w, const Vec& r) {
   const Vec sum = w + r;
   const double length2 = Dot(sum, sum);
   FacetReflection result;
@@ -101,8 +101,9 @@ struct FacetCrossing {
   double reverse_pdf = 0;  // of w, facets drawn from t and always crossed
 };
 // For a facet m that is known to send w to t. cos_m_t is the cosine of t to the facet, positive.
-inline FacetCrossing CrossingAt(const Ggx& ggx, const Vec& w, const Vec& t, const Vec& m,
-                                double cos_m_w, double cos_m_t, double fresnel, double eta) {
+PATINA_HOT inline FacetCrossing CrossingAt(const Ggx& ggx, const Vec& w, const Vec& t, const Vec& m,
+                                           double cos_m_w, double cos_m_t, double fresnel,
+                                           double eta) {
   FacetCrossing crossing;
   crossing.fresnel = fresnel;
   const double across = cos_m_w - eta * cos_m_t;
@@ -113,7 +114,8 @@ inline FacetCrossing CrossingAt(const Ggx& ggx, const Vec& w, const Vec& t, cons
   crossing.value = (1 - fresnel) * mask_t * crossing.pdf;
   return crossing;
 }
-inline FacetCrossing EvaluateCrossing(const Ggx& ggx, const Vec& w, const Vec& t, double eta) {
+PATINA_HOT inline FacetCrossing EvaluateCrossing(const Ggx& ggx, const Vec& w, const Vec& t,
+                                                 double eta) {
   Vec sum = w + eta * t;
   if (sum.z < 0) sum = -sum;
   const double length2 = Dot(sum, sum);

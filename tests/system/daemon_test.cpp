@@ -260,6 +260,9 @@ TEST_F(DaemonTest, HandsBackWhatDoesNotEndInTimeAndTheNextOneFinishesIt) {
   Stop(daemon.get());
   const bool finished = fs::exists(folder_ / "out/floor/current");
   daemon = Start();
+  // Where the first one finished it, nothing below waits for this one, which a signal would end
+  // before it listens to any.
+  Until(daemon.get(), [&] { return Count(Log(), "info ready") == 2; });
   Until(daemon.get(), [&] { return fs::exists(folder_ / "out/floor/current/manifest.json"); });
   Until(daemon.get(), [&] { return Count(Log(), "state=succeeded") == 1; });
   EXPECT_EQ(Count(Log(), "job_started"), finished ? 1u : 2u) << Log();
