@@ -32,6 +32,11 @@ std::string RunRecordToJson(const RunRecord& record) {
     for (const auto& [name, value] : point.measures) entry[name] = value;
     json["curve"].push_back(std::move(entry));
   }
+  for (const SimulationPoint& point : record.simulation) {
+    json["simulation"].push_back({{"paths", point.paths},
+                                  {"standard_error", point.standard_error},
+                                  {"seconds", point.seconds}});
+  }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

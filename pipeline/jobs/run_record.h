@@ -22,6 +22,13 @@ struct RunCurvePoint {
   std::vector<std::pair<std::string, double>> measures;
 };
 
+// What accuracy costs where the input is simulated: measured on some pairs of directions.
+struct SimulationPoint {
+  int paths = 0;              // for each pair
+  double standard_error = 0;  // of log(1 + f c), root mean square over the pairs
+  double seconds = 0;         // of one thread, for a pair
+};
+
 struct RunRecord {
   std::string asset;
   std::string fingerprint;
@@ -38,6 +45,7 @@ struct RunRecord {
   std::vector<StageCost> stages;
   double recording_seconds = 0;  // of the training, to measure the curve
   std::vector<RunCurvePoint> curve;
+  std::vector<SimulationPoint> simulation;  // empty: nothing is simulated
 };
 
 std::string RunRecordToJson(const RunRecord& record);

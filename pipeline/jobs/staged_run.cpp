@@ -160,6 +160,7 @@ RunRecord StagedRun::RecordSoFar(std::vector<RunCurvePoint> curve) const {
   record.stages = stages_;
   record.recording_seconds = recording_seconds_;
   record.curve = std::move(curve);
+  record.simulation = simulation_;
   return record;
 }
 

@@ -93,6 +93,7 @@ class StagedRun {
   Manifest manifest_;
   RunGuards guards_;
   double recording_seconds_ = 0;  // of the training, to measure the curve
+  std::vector<SimulationPoint> simulation_;  // as of the run's record
 
  private:
   using Clock = std::chrono::steady_clock;

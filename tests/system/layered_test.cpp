@@ -40,6 +40,12 @@ TEST(LayeredMaterials, AreBakedLikeMeasuredOnes) {
   EXPECT_EQ(manifest["brdf"]["isotropic"], true);
   const Json& source = manifest["source"];
   EXPECT_EQ(source["format"], "layered");
+  const Json run = Json::parse(ReadAll(folder / "out/lacquered_wood/current/run.json"));
+  ASSERT_EQ(run["simulation"].size(), 4u);
+  // Four times as many paths halve it, give or take the noise of two dozen pairs.
+  EXPECT_LT(run["simulation"][3]["standard_error"],
+            0.5 * run["simulation"][0]["standard_error"].get<double>());
+  EXPECT_GT(run["simulation"][0]["standard_error"], 0);
   EXPECT_EQ(source["files"][0]["path"], "lacquered_wood.layers.json");
   EXPECT_GE(source["simulation"]["pairs"], 32768);
   EXPECT_GE(source["simulation"]["paths"], 32 * source["simulation"]["pairs"].get<int>());
