@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 
 #include "daemon/api/tickets.h"
 #include "daemon/base/unique_fd.h"
@@ -46,20 +47,23 @@ Result<std::string> ReadTokenFile(const std::string& path) {
 }
 
 Result<std::string> ReadOrMakeTokenFile(const std::string& path) {
-  const UniqueFd fd(open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
-  if (!fd && errno != EEXIST) return FailErrno(errno, "cannot make the token file", path);
-  if (fd) {
-    PATINA_ASSIGN(std::string token, RandomName(kMadeTokenBytes));
-    token += "\n";
-    if (write(fd.get(), token.data(), token.size()) != static_cast<ssize_t>(token.size()) ||
-        fsync(fd.get()) != 0) {
-      const int error = errno;
-      // A short one would be refused at every start from now on.
-      unlink(path.c_str());
-      return FailErrno(error, "cannot write the token file", path);
-    }
+  struct stat info {};
+  if (lstat(path.c_str(), &info) == 0 || errno != ENOENT) return ReadTokenFile(path);
+  PATINA_ASSIGN(const std::string token, RandomName(kMadeTokenBytes));
+  // Under another name first: half a token would be refused at every start from then on.
+  const std::string fresh = path + ".new";
+  unlink(fresh.c_str());
+  const UniqueFd fd(
+      open(fresh.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600));
+  if (!fd) return FailErrno(errno, "cannot make the token file", fresh);
+  const std::string line = token + "\n";
+  if (write(fd.get(), line.data(), line.size()) != static_cast<ssize_t>(line.size()) ||
+      fsync(fd.get()) != 0 || rename(fresh.c_str(), path.c_str()) != 0) {
+    const int error = errno;
+    unlink(fresh.c_str());
+    return FailErrno(error, "cannot write the token file", path);
   }
-  return ReadTokenFile(path);
+  return token;
 }
 
 bool CarriesToken(std::string_view authorization, std::string_view token) {

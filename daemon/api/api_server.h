@@ -15,7 +15,8 @@ class ApiServer {
  public:
   // Listens on the Unix socket and, if the configuration names a host, on TCP; answers at once.
   // The service, the source (may be null) and the log must outlive it. Errors: those of
-  // UnixListener, OpenTcpListener and ReadOrMakeTokenFile; kInvalidArgument: TCP without a token file.
+  // UnixListener, OpenTcpListener and ReadOrMakeTokenFile; kInvalidArgument: TCP without a token
+  // file.
   static Result<std::unique_ptr<ApiServer>> Start(const ApiConfig& config,
                                                   const std::string& default_out, Service* service,
                                                   AssetSource* source, Logger* log,

@@ -41,7 +41,8 @@ struct ApiConfig {
   std::string listen_host;  // a loopback address; empty: no TCP
   int listen_port = 0;      // 0 with a host: any free one
   std::string token_file;   // of mode 0600; set where there is TCP
-  bool makes_token = false;  // nobody named token_file, which is the state folder's: made if missing
+  bool makes_token =
+      false;  // nobody named token_file, which is the state folder's: made if missing
   int max_event_clients = 64;
   size_t max_body_bytes = size_t{4} << 20;
   int request_timeout_ms = 10000;

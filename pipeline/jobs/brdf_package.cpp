@@ -88,7 +88,10 @@ Result<BrdfSource> ReadBrdfSource(const Job& job) {
   PATINA_ASSIGN(const FileDigest before, Sha256OfFile(job.file));
   BrdfSource source;
   if (layered::IsLayersFileName(job.file)) {
-    PATINA_ASSIGN(source.data, layered::OpenSimulated(job.file, EffortOfJob(job)));
+    PATINA_ASSIGN(source.stack, layered::ReadStack(job.file));
+    auto simulated = layered::SimulatedSource(*source.stack, EffortOfJob(job));
+    if (!simulated) return Fail(simulated.error(), job.file);
+    source.data = std::move(*simulated);
   } else {
     PATINA_ASSIGN(source.data, brdf::OpenBrdf(job.file));
   }

@@ -10,6 +10,7 @@
 #include "formats/brdf/brdf_source.h"
 #include "formats/container.h"
 #include "formats/index_pack.h"
+#include "formats/layered/layered_stack.h"
 #include "formats/manifest.h"
 #include "formats/weights.h"
 #include "pipeline/brdf/train_brdf.h"
@@ -23,14 +24,15 @@ namespace patina {
 struct BrdfSource {
   brdf::Source
       data;  // its warnings name no folder; isotropic where it is, whatever the format allows
+  std::optional<layered::Stack> stack;  // that data simulates
   // What MeasureAnisotropy says of a table whose format allows for azimuths; else absent.
   std::optional<double> anisotropy;
   std::string sha256;
   std::string fingerprint;  // see BrdfFingerprint
 };
 
-// Errors: those of OpenBrdf and of layered::OpenSimulated; kConflict when the file changed while it
-// was read.
+// Errors: those of OpenBrdf, ReadStack and SimulatedSource; kConflict when the file changed while
+// it was read.
 Result<BrdfSource> ReadBrdfSource(const Job& job);
 
 // Where the codebook of a model lies if it is shared; both empty if it is not.

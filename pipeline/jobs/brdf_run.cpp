@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "formats/base/file_io.h"
-#include "formats/layered/layered_file.h"
 #include "formats/model_bytes.h"
 #include "pipeline/jobs/brdf_job.h"
 #include "pipeline/jobs/measure_brdf.h"
@@ -13,7 +12,6 @@
 #include "pipeline/jobs/page_pictures.h"
 #include "pipeline/jobs/report_page.h"
 #include "pipeline/jobs/staged_run.h"
-#include "pipeline/layered/accuracy_curve.h"
 
 namespace patina {
 namespace {
@@ -93,7 +91,6 @@ class BrdfRun : public StagedRun {
     }
     model_ = std::move(*trained);
     if (source_.data.simulated) {
-      PATINA_TRY(RecordSimulation());
       const brdf::SimulationCost cost = source_.data.simulated->Spent();
       observer_.OnNote("simulated",
                        Format("%.1f M paths for %.0f k pairs of directions, standard error %.4f",
@@ -103,19 +100,12 @@ class BrdfRun : public StagedRun {
     return Trained();
   }
 
-  Status RecordSimulation() {
-    PATINA_ASSIGN(const layered::Stack stack, layered::ReadStack(job_.file));
-    for (const layered::AccuracyPoint& point :
-         layered::MeasureAccuracy(layered::Simulator(stack), job_.seed))
-      simulation_.push_back({point.paths, point.standard_error, point.seconds});
-    return {};
-  }
-
   Status Trained() {
     result_.samples = model_.samples;
     recording_seconds_ = model_.recording_s;
     result_.stopped_by = "budget";
     WarnOfRollbacks(model_.rollbacks);
+    if (source_.stack) RecordSimulation(*source_.stack);
     return {};
   }
 

@@ -187,6 +187,20 @@ void AddEffects(const PageFacts& facts, const char* subject, Html* html) {
   html->Close();
 }
 
+void AddSimulation(const PageFacts& facts, Html* html) {
+  if (facts.run.simulation.empty()) return;
+  Table table;
+  table.caption = "What the accuracy of the simulation costs";
+  table.heads = {"paths for a pair of directions", "standard error of log(1 + f)",
+                 "microseconds of one core"};
+  for (const SimulationPoint& point : facts.run.simulation) {
+    table.rows.push_back(
+        {std::to_string(point.paths),
+         {{ShortText(point.standard_error, 3)}, {ShortText(1e6 * point.seconds, 3)}}});
+  }
+  AddTable(table, html);
+}
+
 void AddTrainingFacts(const std::vector<std::pair<std::string, std::string>>& facts, Html* html) {
   Table table;
   table.caption = "The training";

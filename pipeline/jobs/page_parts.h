@@ -34,6 +34,9 @@ void AddBytesSection(const PageFacts& facts, const std::vector<TextureBytes>& pe
 // The manifest's effects with their savings. subject: the head of the first column.
 void AddEffects(const PageFacts& facts, const char* subject, Html* html);
 
+// Standard error and time against paths, of what is simulated; else nothing.
+void AddSimulation(const PageFacts& facts, Html* html);
+
 // Names and values of the training.
 void AddTrainingFacts(const std::vector<std::pair<std::string, std::string>>& facts, Html* html);
 

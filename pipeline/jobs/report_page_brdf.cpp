@@ -208,20 +208,6 @@ std::vector<TextureBytes> PlainTables(const ManifestBrdf& brdf) {
           {"the file's colours as floats", 4 * kChannels * brdf.cells}};
 }
 
-void AddSimulation(const PageFacts& facts, Html* html) {
-  if (facts.run.simulation.empty()) return;
-  Table table;
-  table.caption = "What the accuracy of the simulation costs";
-  table.heads = {"paths for a pair of directions", "standard error of log(1 + f)",
-                 "microseconds of one core"};
-  for (const SimulationPoint& point : facts.run.simulation) {
-    table.rows.push_back(
-        {std::to_string(point.paths),
-         {{ShortText(point.standard_error, 3)}, {ShortText(1e6 * point.seconds, 3)}}});
-  }
-  AddTable(table, html);
-}
-
 }  // namespace
 
 std::string BrdfReportPage(const PageFacts& facts, const BrdfSource& source,

@@ -163,6 +163,7 @@ std::string SvbrdfReportPage(const PageFacts& facts, const SvbrdfMeasurement& me
   AddWarnings(facts, &html);
   AddPlanes(facts, measurement, planes, &html);
   AddTimeSection(facts, &html);
+  AddSimulation(facts, &html);
   AddErrors(measurement, &html);
   if (IsMeasured(facts)) {
     AddBytesSection(

@@ -8,6 +8,7 @@
 #include "pipeline/image/image_io.h"
 #include "pipeline/jobs/machine.h"
 #include "pipeline/jobs/report_page.h"
+#include "pipeline/layered/accuracy_curve.h"
 #include "pipeline/report/picture.h"
 
 namespace patina {
@@ -162,6 +163,12 @@ RunRecord StagedRun::RecordSoFar(std::vector<RunCurvePoint> curve) const {
   record.curve = std::move(curve);
   record.simulation = simulation_;
   return record;
+}
+
+void StagedRun::RecordSimulation(const layered::Stack& stack) {
+  for (const layered::AccuracyPoint& point :
+       layered::MeasureAccuracy(layered::Simulator(stack), job_.seed))
+    simulation_.push_back({point.paths, point.standard_error, point.seconds});
 }
 
 Status StagedRun::AddRunRecord(std::vector<RunCurvePoint> curve) {

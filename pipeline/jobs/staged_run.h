@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "formats/container.h"
+#include "formats/layered/layered_stack.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/base/thread_pool.h"
 #include "pipeline/jobs/event_log.h"
@@ -76,6 +77,8 @@ class StagedRun {
   Status AddRunRecord(std::vector<RunCurvePoint> curve);
   // AddRunRecord and the container's publication.
   Status Publish(std::vector<RunCurvePoint> curve);
+  // What accuracy costs where the input is simulated, for the record and the report page.
+  void RecordSimulation(const layered::Stack& stack);
   // If the trainer was set back because of values that are not finite.
   void WarnOfRollbacks(int rollbacks);
   // The manifest with what is staged so far.
@@ -92,7 +95,7 @@ class StagedRun {
   std::optional<ThreadPool> pool_;
   Manifest manifest_;
   RunGuards guards_;
-  double recording_seconds_ = 0;  // of the training, to measure the curve
+  double recording_seconds_ = 0;             // of the training, to measure the curve
   std::vector<SimulationPoint> simulation_;  // as of the run's record
 
  private:

@@ -81,6 +81,7 @@ class SvbrdfRun : public StagedRun {
                     1e-6 * static_cast<double>(cost_.paths),
                     1e-3 * static_cast<double>(cost_.pairs), cost_.standard_error);
       observer_.OnNote("simulated", text);
+      RecordSimulation(*source_.simulated);
     }
     return {};
   }

@@ -1,5 +1,6 @@
 #include "pipeline/jobs/svbrdf_source.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <mutex>
 #include <optional>
@@ -138,7 +139,7 @@ Result<SvbrdfSource> ReadStack(const Job& job, ThreadPool& pool, const CancelTok
   const layered::Simulator mean(model->mean());
   auto outlook = layered::LookAhead(mean);
   if (!outlook) return Fail(outlook.error(), job.file);
-  source.simulated = !model->exact();
+  if (!model->exact()) source.simulated = model->mean();
   source.warnings = layered::WarningsOf(*outlook);
   source.warnings.insert(source.warnings.end(), model->warnings().begin(), model->warnings().end());
   source.effects = layered::EffectNames(model->effects());
@@ -169,7 +170,11 @@ Result<SvbrdfSource> ReadTextureSet(const Job& job, ThreadPool& pool, const Canc
   options.color.config = *config;
   options.color.space = job.color_space;
   std::string how;
-  for (const MapSource& map : set.maps) source.paths.push_back(map.path);
+  for (const MapSource& map : set.maps) {
+    // A file may hold several maps.
+    if (std::find(source.paths.begin(), source.paths.end(), map.path) == source.paths.end())
+      source.paths.push_back(map.path);
+  }
   PATINA_ASSIGN(source.digests, HashFiles(source.paths, pool, cancel));
   PATINA_ASSIGN(const SourceMaps maps, LoadSourceMaps(set, options, pool, progress));
   PATINA_ASSIGN(const auto model, svbrdf::PbrModel::Make(maps, set.name, job.address, pool));
@@ -179,11 +184,9 @@ Result<SvbrdfSource> ReadTextureSet(const Job& job, ThreadPool& pool, const Canc
   for (const MapPlan& plan : maps.plans) {
     const ReferenceFile& file = maps.descriptions[static_cast<size_t>(plan.file)];
     how += "map " + std::string(plan.role->name);
-    for (size_t i = 0; i < source.paths.size(); ++i) {
-      if (source.paths[i] != file.path) continue;
-      how += " " + source.digests[i];
-      break;
-    }
+    const auto path = std::find(source.paths.begin(), source.paths.end(), file.path);
+    if (path != source.paths.end())
+      how += " " + source.digests[static_cast<size_t>(path - source.paths.begin())];
     for (const int channel : plan.channels) how += " " + std::to_string(channel);
     how += std::string(plan.invert ? " inverted" : "") + (plan.srgb ? " srgb " : " linear ") +
            NormalConventionName(plan.convention);
@@ -192,12 +195,8 @@ Result<SvbrdfSource> ReadTextureSet(const Job& job, ThreadPool& pool, const Canc
     converted = converted || plan.color.transform != nullptr;
   }
   source.images_sha256 = HashOfDigests(source.digests, 0);
-  std::string last;
-  for (size_t i = 0; i < source.paths.size(); ++i) {
-    if (source.paths[i] == last) continue;  // a file of several maps
-    last = source.paths[i];
-    AddFile(last, source.digests[i], &source);
-  }
+  for (size_t i = 0; i < source.paths.size(); ++i)
+    AddFile(source.paths[i], source.digests[i], &source);
   source.effects = model->used();
   source.left_out = model->left_out();
   source.warnings = model->warnings();

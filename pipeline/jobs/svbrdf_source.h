@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "formats/base/result.h"
+#include "formats/layered/layered_stack.h"
 #include "formats/manifest.h"
 #include "pipeline/base/progress.h"
 #include "pipeline/base/thread_pool.h"
@@ -23,14 +25,14 @@ inline constexpr const char* kTextureSetFormat = "texture_set";
 struct SvbrdfSource {
   std::string format;  // "image_set", "layered", kTextureSetFormat
   std::shared_ptr<const svbrdf::VaryingSource> texels;
-  uint64_t images = 0;                  // measured ones
-  std::vector<std::string> paths;       // of all files, those of the images or maps last
-  std::vector<std::string> digests;     // SHA-256 of each
-  std::vector<ManifestBrdfFile> files;  // for the manifest
-  std::string images_sha256;            // as in ManifestImageSet
-  std::string fingerprint;              // recipe version, canonical job, what was read and how
-  std::string found;                    // for people
-  bool simulated = false;
+  uint64_t images = 0;                      // measured ones
+  std::vector<std::string> paths;           // of all files, those of the images or maps last
+  std::vector<std::string> digests;         // SHA-256 of each
+  std::vector<ManifestBrdfFile> files;      // for the manifest
+  std::string images_sha256;                // as in ManifestImageSet
+  std::string fingerprint;                  // recipe version, canonical job, what was read and how
+  std::string found;                        // for people
+  std::optional<layered::Stack> simulated;  // with the means of its maps; else f is exact
   std::vector<std::string> effects, left_out;  // of what f follows from; empty of images
   std::vector<std::string> warnings;
 };

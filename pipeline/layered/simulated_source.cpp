@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "formats/layered/layered_file.h"
-
 namespace patina::layered {
 namespace {
 
@@ -149,13 +147,6 @@ Result<brdf::Source> SimulatedSource(const Stack& stack, const Effort& effort) {
   source.effects = EffectNames(simulator.effects());
   source.left_out_effects = LeftOutNames(simulator.effects());
   source.warnings = WarningsOf(outlook);
-  return source;
-}
-
-Result<brdf::Source> OpenSimulated(const std::string& path, const Effort& effort) {
-  PATINA_ASSIGN(const Stack stack, ReadStack(path));
-  auto source = SimulatedSource(stack, effort);
-  if (!source) return Fail(source.error(), path);
   return source;
 }
 

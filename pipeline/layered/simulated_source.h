@@ -41,7 +41,4 @@ double MeanOfCounted(uint64_t squares, uint64_t pairs);  // root mean square
 // reflected; the message names no file.
 Result<brdf::Source> SimulatedSource(const Stack& stack, const Effort& effort);
 
-// The same of a file. Errors: those of ReadStack and SimulatedSource.
-Result<brdf::Source> OpenSimulated(const std::string& path, const Effort& effort);
-
 }  // namespace patina::layered

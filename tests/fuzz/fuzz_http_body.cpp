@@ -24,12 +24,8 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
           "limits": {"memory_mb": 512, "cpu_s": 10, "wall_s": 20}})",
       R"({"job": {"kind": "brdf", "asset": "a", "file": "/f.binary"}})", R"({"priority": -5})",
       "{}"};
-  std::vector<std::vector<uint8_t>> seeds;
-  for (const std::string_view text : texts) {
-    FUZZ_CHECK(daemon::ParseSubmit(text, "/baked").problems.empty() ||
-               daemon::ParsePriority(text).problems.empty() ||
-               daemon::CheckEmptyBody(text).empty());
-    seeds.emplace_back(text.begin(), text.end());
-  }
-  return seeds;
+  return SeedsOf(texts, [](std::string_view text) {
+    return daemon::ParseSubmit(text, "/baked").problems.empty() ||
+           daemon::ParsePriority(text).problems.empty() || daemon::CheckEmptyBody(text).empty();
+  });
 }

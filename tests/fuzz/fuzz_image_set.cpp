@@ -28,10 +28,10 @@ bool Usable(const brdf::Direction& d) {
 }
 
 // Whether it is accepted.
-bool Try(const uint8_t* data, size_t size) {
+bool Try(std::string_view text) {
   const std::string path = Folder() + "/s.btf.json";
   std::ofstream(path, std::ios::binary | std::ios::trunc)
-      .write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
+      .write(text.data(), static_cast<std::streamsize>(text.size()));
   const auto set = svbrdf::ReadImageSet(path);
   if (!set) {
     FUZZ_CHECK(!set.error().message.empty() && set.error().code == ErrorCode::kInvalidArgument);
@@ -50,7 +50,7 @@ bool Try(const uint8_t* data, size_t size) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  Try(data, size);
+  Try({reinterpret_cast<const char*>(data), size});
   return 0;
 }
 
@@ -61,10 +61,5 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
       R"({"version": 1, "width": 3, "height": 2, "address": "wrap", "values": "brdf_cosine", "scale": 0.3183,
           "images": [{"file": "a.exr", "light": [0, 0.6, 0.8], "view": [0, 0, 1]},
                      {"file": "b.exr", "light": [0, -0.6, 0.8], "view": [0.48, 0.36, 0.8]}]})"};
-  std::vector<std::vector<uint8_t>> seeds;
-  for (const std::string& text : texts) {
-    seeds.emplace_back(text.begin(), text.end());
-    FUZZ_CHECK(Try(seeds.back().data(), seeds.back().size()));
-  }
-  return seeds;
+  return SeedsOf(texts, Try);
 }

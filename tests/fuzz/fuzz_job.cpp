@@ -34,10 +34,7 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
           "quality": "reference", "seed": 7, "threads": 2, "target_psnr_db": 36.5, "address": "clamp"})",
       R"({"version": 1, "kind": "brdf", "asset": "a", "file": "f.binary", "out": "o", "model": {"nside": 8}})",
       "0,0,1,0.6,0,0.8\n# note\n0.6,0,0.8,0,0,1\n"};
-  std::vector<std::vector<uint8_t>> seeds;
-  for (const std::string& text : texts) {
-    FUZZ_CHECK(ParseJob(text, "", "seed").has_value() || ParsePairs(text, "seed").has_value());
-    seeds.emplace_back(text.begin(), text.end());
-  }
-  return seeds;
+  return SeedsOf(texts, [](std::string_view text) {
+    return ParseJob(text, "", "seed").has_value() || ParsePairs(text, "seed").has_value();
+  });
 }

@@ -23,8 +23,7 @@ void CheckMap(const layered::StackMap& map, const layered::Stack& stack) {
 }
 
 // Whether it is accepted.
-bool Try(const uint8_t* data, size_t size) {
-  const std::string text(reinterpret_cast<const char*>(data), size);
+bool Try(std::string_view text) {
   const auto varying = layered::ParseVaryingStack(text, "x");
   const auto plain = layered::ParseStack(text, "x");
   FUZZ_CHECK(plain.has_value() == (varying.has_value() && !varying->varies()));
@@ -46,7 +45,7 @@ bool Try(const uint8_t* data, size_t size) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  Try(data, size);
+  Try({reinterpret_cast<const char*>(data), size});
   return 0;
 }
 
@@ -63,10 +62,5 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
           {"map": "w.png", "color_space": "srgb"}}, "normal": {"map": "n.png",
           "convention": "directx"}, "address": "clamp"})",
       R"({"version": 1, "base": {"kind": "black"}})"};
-  std::vector<std::vector<uint8_t>> seeds;
-  for (const std::string& text : texts) {
-    seeds.emplace_back(text.begin(), text.end());
-    FUZZ_CHECK(Try(seeds.back().data(), seeds.back().size()));
-  }
-  return seeds;
+  return SeedsOf(texts, Try);
 }

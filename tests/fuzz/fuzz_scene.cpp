@@ -69,10 +69,7 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
       test::OneMaterial().dump(), rich.dump(), test::Glb(packed, test::PngBytes()),
       test::Glb(test::OneMaterial()),
       R"({"version": 1, "materials": [{"name": "wall", "maps": [{"role": "albedo", "file": "a.png"}]}]})"};
-  std::vector<std::vector<uint8_t>> seeds;
-  for (const std::string& text : texts) {
-    seeds.emplace_back(text.begin(), text.end());
-    FUZZ_CHECK(TryAll(seeds.back().data(), seeds.back().size()));
-  }
-  return seeds;
+  return SeedsOf(texts, [](std::string_view text) {
+    return TryAll(reinterpret_cast<const uint8_t*>(text.data()), text.size());
+  });
 }

@@ -20,15 +20,13 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
   const std::pair<brdf::Direction, brdf::Direction> pairs[] = {
       {brdf::FromDegrees(10, 0), brdf::FromDegrees(50, 120)},
       {brdf::FromDegrees(89, 3), brdf::FromDegrees(0, 0)}};
-  std::vector<std::vector<uint8_t>> seeds;
-  for (const std::string& text : {brdf::EncodeSparseCsv(brdf::SmoothBrdf, pairs, true),
-                                  brdf::EncodeSparseCsv(brdf::SkewBrdf, pairs, false),
-                                  brdf::EncodeSparseJson(brdf::SmoothBrdf, pairs, false),
-                                  std::string("theta_i, phi_i, theta_o, phi_o, r, g, b, weight\n# "
-                                              "note\n10,0,50,120,1,2,3,0.5\n\n")}) {
-    FUZZ_CHECK(brdf::ParseSparseCsv(text, "seed").has_value() ||
-               brdf::ParseSparseJson(text, "seed").has_value());
-    seeds.emplace_back(text.begin(), text.end());
-  }
-  return seeds;
+  const std::string texts[] = {brdf::EncodeSparseCsv(brdf::SmoothBrdf, pairs, true),
+                               brdf::EncodeSparseCsv(brdf::SkewBrdf, pairs, false),
+                               brdf::EncodeSparseJson(brdf::SmoothBrdf, pairs, false),
+                               "theta_i, phi_i, theta_o, phi_o, r, g, b, weight\n# "
+                               "note\n10,0,50,120,1,2,3,0.5\n\n"};
+  return SeedsOf(texts, [](std::string_view text) {
+    return brdf::ParseSparseCsv(text, "seed").has_value() ||
+           brdf::ParseSparseJson(text, "seed").has_value();
+  });
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <string_view>
 #include <vector>
 
 // Takes any bytes. Aborts (or is stopped by a sanitizer) when a property does not hold.
@@ -20,3 +21,14 @@ std::vector<std::vector<uint8_t>> FuzzSeeds();
       std::abort();                                                                       \
     }                                                                                     \
   } while (false)
+
+// Texts as seeds, each of which `accepts` must take.
+template <class Texts, class Accepts>
+std::vector<std::vector<uint8_t>> SeedsOf(const Texts& texts, Accepts accepts) {
+  std::vector<std::vector<uint8_t>> seeds;
+  for (const std::string_view text : texts) {
+    FUZZ_CHECK(accepts(text));
+    seeds.emplace_back(text.begin(), text.end());
+  }
+  return seeds;
+}

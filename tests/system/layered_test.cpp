@@ -46,6 +46,8 @@ TEST(LayeredMaterials, AreBakedLikeMeasuredOnes) {
   EXPECT_LT(run["simulation"][3]["standard_error"],
             0.5 * run["simulation"][0]["standard_error"].get<double>());
   EXPECT_GT(run["simulation"][0]["standard_error"], 0);
+  EXPECT_THAT(ReadAll(folder / "out/lacquered_wood/current/report.html"),
+              HasSubstr("What the accuracy of the simulation costs"));
   EXPECT_EQ(source["files"][0]["path"], "lacquered_wood.layers.json");
   EXPECT_GE(source["simulation"]["pairs"], 32768);
   EXPECT_GE(source["simulation"]["paths"], 32 * source["simulation"]["pairs"].get<int>());

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "formats/decoder/patina_svbrdf_decoder.h"
 #include "formats/schema_check.h"
@@ -223,7 +224,9 @@ TEST_F(BakedMaps, LayersAreSimulatedAtEachTexel) {
               AllOf(HasSubstr("maps of 16 x 16 texels"), HasSubstr("simulated"),
                     HasSubstr("no texel has one")));
   EXPECT_THAT(ReadAll(folder_ / "out/maps/current/report.html"),
-              AllOf(HasSubstr("Three of 64 pairs"), HasSubstr("rough refraction")));
+              AllOf(HasSubstr("Three of 64 pairs"), HasSubstr("rough refraction"),
+                    HasSubstr("What the accuracy of the simulation costs")));
+  EXPECT_EQ(Json::parse(ReadAll(folder_ / "out/maps/current/run.json"))["simulation"].size(), 4u);
   const Outcome valid =
       Patina({"validate", folder_ / "out/maps", "--against", list, "--fail-on", "warning"});
   EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
@@ -254,6 +257,11 @@ TEST_F(BakedMaps, ATextureSetBecomesReflectance) {
   const Json manifest = Manifest();
   EXPECT_EQ(manifest["source"]["format"], "texture_set");
   EXPECT_EQ(manifest["source"]["images"]["address"], "clamp");
+  // Files that hold several maps are listed once.
+  std::set<std::string> files;
+  for (const Json& file : manifest["source"]["files"]) files.insert(file["path"]);
+  EXPECT_EQ(files.size(), manifest["source"]["files"].size());
+  EXPECT_FALSE(Json::parse(ReadAll(folder_ / "out/maps/current/run.json")).contains("simulation"));
   EXPECT_EQ(manifest["effects"][0]["what"], "ao");
   EXPECT_EQ(manifest["effects"][0]["state"], "left_out");
   EXPECT_FALSE(manifest["brdf"]["isotropic"]);

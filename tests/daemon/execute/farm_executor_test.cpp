@@ -13,6 +13,7 @@
 #include "daemon/execute/slurm_commands.h"
 #include "daemon/execute/template_commands.h"
 #include "pipeline/jobs/run_guards.h"
+#include "tests/daemon/execute/attempt_files.h"
 #include "tests/formats/test_support.h"
 
 namespace patina::daemon {
@@ -30,24 +31,20 @@ const std::set<std::string>& Programs() {
 class FarmTest : public testing::Test {
  protected:
   void SetUp() override {
-    for (const char* made : {"bin", "farm/jobs", "farm/faults", "in", "out/wall", "job"})
+    for (const char* made : {"bin", "farm/jobs", "farm/faults"})
       fs::create_directories(folder_ / made);
     for (const std::string& name : Programs()) {
       fs::create_symlink(PATINA_SOURCE_DIR "/tests/daemon/execute/fake_farm.py",
                          folder_ / ("bin/" + name));
     }
     std::ofstream(folder_ / "farm/nodes") << "n1\nn2\n";
-    std::ofstream(folder_ / "in/input.png") << "content";
     path_ = std::getenv("PATH");
     ::setenv("PATH", ((folder_ / "bin:") + path_).c_str(), 1);
     ::setenv("FAKE_FARM", (folder_ / "farm").c_str(), 1);
     options_.worker = std::string(PATINA_BIN_DIR) + "/fake_worker";
     options_.poll_ms = 20;
     options_.result_wait_ms = 100;
-    for (const char* name : {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS"}) {
-      if (const char* value = std::getenv(name))
-        options_.environment.push_back(std::string(name) + "=" + value);
-    }
+    options_.environment = test::SanitizerEnvironment();
     Restart();
   }
 
@@ -71,21 +68,7 @@ class FarmTest : public testing::Test {
   }
 
   AttemptSpec Prepare(const std::string& behaviour, int64_t attempt = 1) {
-    AttemptSpec spec;
-    spec.job = 7;
-    spec.attempt = attempt;
-    spec.folder = folder_ / ("job/a" + std::to_string(attempt));
-    spec.fence = folder_ / "job/fence";
-    spec.log = folder_ / "job/log";
-    spec.out = folder_ / "out";
-    spec.asset = "wall";
-    fs::create_directories(spec.folder);
-    std::ofstream(folder_ / "in/behaviour") << "0 " << behaviour << "\n";
-    std::ofstream(spec.folder + "/job.json")
-        << R"({"version": 1, "kind": "material", "asset": "wall", "folder": ")" << (folder_ / "in")
-        << R"(", "out": ")" << spec.out << R"("})";
-    EXPECT_TRUE(MoveFence(spec.fence, attempt));
-    return spec;
+    return test::PrepareAttempt(folder_, behaviour, attempt);
   }
   void Start(const AttemptSpec& spec) {
     events_.clear();
@@ -133,6 +116,12 @@ class FarmTest : public testing::Test {
     Until([this] { return end_.has_value(); });
     static const AttemptReport none;
     return end_ ? *end_ : none;
+  }
+  // Of the first attempt: it ends when it is asked to, and was submitted once.
+  void ExpectToStop() {
+    executor_->Stop(7, 1, StopMode::kTerminate);
+    EXPECT_NE(UntilEnded().result_json.find("130"), std::string::npos);
+    EXPECT_EQ(Jobs(), 1);
   }
   void UntilItTrains() {
     Until([this] {
@@ -207,9 +196,7 @@ TEST_F(FarmTest, NoAnswerAboutJobsIsNoAnswer) {
   Heal("squeue.hang");
   Heal("squeue.fail");
   Until([this] { return executor_->problem().empty(); });
-  executor_->Stop(7, 1, StopMode::kTerminate);
-  EXPECT_NE(UntilEnded().result_json.find("130"), std::string::npos);
-  EXPECT_EQ(Jobs(), 1);
+  ExpectToStop();
 }
 
 TEST_F(FarmTest, AWorkerThatIsDoneNeedsNoWordOfTheFarm) {
@@ -377,9 +364,7 @@ TEST_F(FarmTest, ALaterDaemonTakesOver) {
     EXPECT_FALSE(end_);
     EXPECT_EQ(Read(spec.folder + "/farm_id"), "1\n");
   }
-  executor_->Stop(7, 1, StopMode::kTerminate);
-  EXPECT_NE(UntilEnded().result_json.find("130"), std::string::npos);
-  EXPECT_EQ(Jobs(), 1);
+  ExpectToStop();
 }
 
 TEST_F(FarmTest, ALaterDaemonSubmitsWhatWasDescribedAndNotSubmitted) {

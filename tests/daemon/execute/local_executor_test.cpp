@@ -13,6 +13,7 @@
 
 #include "daemon/execute/sandbox.h"
 #include "pipeline/jobs/run_guards.h"
+#include "tests/daemon/execute/attempt_files.h"
 #include "tests/formats/test_support.h"
 
 namespace patina::daemon {
@@ -27,35 +28,14 @@ class LocalExecutorTest : public testing::Test {
   static std::unique_ptr<Executor> Make() {
     LocalExecutorOptions options;
     options.worker = std::string(PATINA_BIN_DIR) + "/fake_worker";
-    for (const char* name : {"ASAN_OPTIONS", "UBSAN_OPTIONS", "TSAN_OPTIONS"}) {
-      if (const char* value = std::getenv(name))
-        options.environment.push_back(std::string(name) + "=" + value);
-    }
+    options.environment = test::SanitizerEnvironment();
     auto executor = MakeLocalExecutor(options, RealFileCalls(), NoLog());
     EXPECT_TRUE(executor) << MessageOf(executor);
     return std::move(*executor);
   }
 
-  // An attempt whose worker behaves like this.
   AttemptSpec Prepare(const std::string& behaviour, int64_t attempt = 1) {
-    AttemptSpec spec;
-    spec.job = 7;
-    spec.attempt = attempt;
-    spec.folder = folder_ / ("a" + std::to_string(attempt));
-    spec.fence = folder_ / "fence";
-    spec.log = folder_ / "log";
-    spec.out = folder_ / "out";
-    spec.asset = "wall";
-    spec.inputs = {folder_ / "in"};
-    for (const std::string& made : {spec.folder, spec.out + "/wall", folder_ / "in"})
-      std::filesystem::create_directories(made);
-    std::ofstream(folder_ / "in/input.png") << "content";
-    std::ofstream(folder_ / "in/behaviour") << "0 " << behaviour << "\n";
-    std::ofstream(spec.folder + "/job.json")
-        << R"({"version": 1, "kind": "material", "asset": "wall", "folder": ")" << (folder_ / "in")
-        << R"(", "out": ")" << spec.out << R"("})";
-    EXPECT_TRUE(MoveFence(spec.fence, attempt));
-    return spec;
+    return test::PrepareAttempt(folder_, behaviour, attempt);
   }
 
   std::string Start(const AttemptSpec& spec) {
@@ -92,7 +72,7 @@ class LocalExecutorTest : public testing::Test {
   }
 
   std::string Log() {
-    auto text = ReadTextFile(folder_ / "log", 1 << 20);
+    auto text = ReadTextFile(folder_ / "job/log", 1 << 20);
     return text ? *text : "";
   }
 
