@@ -142,6 +142,10 @@ Result<std::string> AskExecutor(const Config& config, Clock& clock) {
   const CommandOutcome outcome = RunToItsEnd(&runner, words, timeout_ms);
   if (outcome.exit_code == 0) return outcome.error;
   const std::string trouble = FailureOf(words[0], outcome);
+  if (outcome.not_started) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "/executor: " + trouble + "; install Slurm's programs (Debian: slurm-client)");
+  }
   const Words status = commands->Status({}, {})[0].words;
   const CommandOutcome answer = RunToItsEnd(&runner, status, timeout_ms);
   if (outcome.exit_code < 0 || answer.exit_code != 0)

@@ -21,9 +21,9 @@ Result<std::unique_ptr<Executor>> MakeExecutor(const Config& config,
 
 // Asks Slurm whether it would take a job of the configuration's limits, and submits nothing;
 // without a farm, whether the kernel has the sandbox that is required. The answer is text to print,
-// empty for other executors. Errors: kInvalidArgument (it would not, or its arguments or templates
-// are wrong), kUnsupported (no sandbox), kIo (it does not answer; that says nothing about the
-// configuration).
+// empty for other executors. Errors: kInvalidArgument (it would not, its programs are not here, or
+// its arguments or templates are wrong), kUnsupported (no sandbox), kIo (it does not answer; that
+// says nothing about the configuration).
 Result<std::string> AskExecutor(const Config& config, Clock& clock);
 
 }  // namespace patina::daemon

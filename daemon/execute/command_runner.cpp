@@ -77,6 +77,7 @@ uint64_t CommandRunner::Start(const std::vector<std::string>& words, int64_t tim
   command.outcome.id = ++last_id_;
   command.end_ms = clock_.SteadyMs() + timeout_ms;
   if (const Status spawned = Spawn(words, &command); !spawned) {
+    command.outcome.not_started = true;
     command.outcome.error = spawned.error().message;
     not_started_.push_back(std::move(command.outcome));
     return last_id_;

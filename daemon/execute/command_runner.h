@@ -20,6 +20,7 @@ struct CommandOutcome {
   uint64_t id = 0;
   int exit_code = -1;  // -1: it was killed, ran out of time, or could not be started
   bool timed_out = false;
+  bool not_started = false;  // it did nothing
   std::string out;
   std::string error;  // what it wrote to standard error, or why it could not be started
 };

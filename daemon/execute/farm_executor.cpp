@@ -353,7 +353,7 @@ class FarmExecutor : public Executor {
         "farm_not_submitted",
         {{"job", attempt.spec.job}, {"attempt", attempt.spec.attempt}, {"reason", trouble}});
     // A nonzero code is a no. Anything else may be a yes that was lost on its way.
-    const bool is_no = outcome.exit_code > 0;
+    const bool is_no = outcome.exit_code > 0 || outcome.not_started;
     if (is_no && call.excluded) {
       attempt.use_excluded = false;  // That left none.
     } else if (is_no) {

@@ -50,8 +50,9 @@ DaemonProcess::DaemonProcess(const std::string& program, const std::vector<std::
   std::vector<char*> argv, envp;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
-  for (char** entry = environ; *entry != nullptr; ++entry) envp.push_back(*entry);
+  // Of two entries of a name the first counts.
   for (const std::string& entry : environment) envp.push_back(const_cast<char*>(entry.c_str()));
+  for (char** entry = environ; *entry != nullptr; ++entry) envp.push_back(*entry);
   envp.push_back(nullptr);
   pid_ = ::fork();
   if (pid_ == 0) {

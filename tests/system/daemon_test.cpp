@@ -305,9 +305,10 @@ TEST_F(DaemonTest, TellsTheServiceManagerAndReadsItsConfigurationAgain) {
 }
 
 TEST_F(DaemonTest, CommandLineHasTheExitCodesOfTheProgram) {
-  const auto run = [&](const std::vector<std::string>& arguments) {
+  const auto run = [&](const std::vector<std::string>& arguments,
+                       const std::vector<std::string>& environment = {}) {
     fs::remove(folder_ / "said");
-    DaemonProcess process("patinad", arguments, folder_ / "said");
+    DaemonProcess process("patinad", arguments, folder_ / "said", environment);
     EXPECT_TRUE(process.Ended(60000));
     return process.exit_code();
   };
@@ -324,6 +325,13 @@ TEST_F(DaemonTest, CommandLineHasTheExitCodesOfTheProgram) {
   for (const char* what : {"--watch", "--listen", "--cores", "/out", "4 problems"})
     EXPECT_NE(ReadAll(folder_ / "said").find(what), std::string::npos) << what;
   EXPECT_EQ(run({"--config", folder_ / "none"}), 3);
+  // A farm whose programs are not here: unlike one that does not answer, this stays so.
+  std::ofstream(folder_ / "farm.json") << R"({"version": 1, "executor": {"kind": "slurm"}})";
+  EXPECT_EQ(run({"--check-config", "--config", folder_ / "farm.json", "--out", folder_ / "o",
+                 "--state", folder_ / "s"},
+                {"PATH=" + (folder_ / "nothing")}),
+            3);
+  EXPECT_NE(ReadAll(folder_ / "said").find("cannot run sbatch"), std::string::npos);
 }
 
 }  // namespace

@@ -159,9 +159,13 @@ TEST_F(CommandRunnerTest, TellsHowProgramsEnd) {
   EXPECT_EQ(fine.out, "out\n");
   EXPECT_EQ(fine.error, "err\n");
   EXPECT_EQ(FailureOf("sh", fine), "sh: exit code 3: err");
-  EXPECT_EQ(Run({"sh", "-c", "kill -9 $$"}).exit_code, -1);
+  EXPECT_FALSE(fine.not_started);
+  const CommandOutcome killed = Run({"sh", "-c", "kill -9 $$"});
+  EXPECT_EQ(killed.exit_code, -1);
+  EXPECT_FALSE(killed.not_started);
   const CommandOutcome none = Run({"no-such-program-of-ours"});
   EXPECT_EQ(none.exit_code, -1);
+  EXPECT_TRUE(none.not_started);
   EXPECT_NE(none.error.find("no-such-program-of-ours"), std::string::npos);
   // More than fits into a pipe.
   EXPECT_EQ(Run({"sh", "-c", "head -c 1000000 /dev/zero"}).out.size(), 1000000u);
