@@ -6,11 +6,13 @@
 namespace patina::layered {
 namespace {
 
-// All effects, without connections. One kernel serves every stack: exits are asked for by tests and
+// All effects, without connections. Two kernels serve every stack: exits are asked for by tests and
 // tables of energy only.
+template <bool diffuse_base>
 struct ExitEffects {
   static constexpr bool kDeep = true, kRough = true, kAnisotropic = true, kAbsorption = true,
-                        kScattering = true, kColour = true, kConnect = false;
+                        kScattering = true, kColour = true, kConnect = false,
+                        kDiffuseBase = diffuse_base;
 };
 
 PreparedSurface PrepareSurface(const Roughness& roughness) {
@@ -109,12 +111,13 @@ EstimateKernel KernelFor(const Effects& effects) {
 }
 
 void EvaluateBareBase(const PreparedStack& stack, const Vec& wi, const Vec& wo, double f[3]) {
-  Kernel<ExitEffects>::EvaluateBase(stack, wi, wo, f);
+  Kernel<ExitEffects<false>>::EvaluateBase(stack, wi, wo, f);
   for (int c = 0; c < 3; ++c) f[c] /= wo.z;
 }
 
 Exit WalkOnce(const PreparedStack& stack, const Vec& w, Rng* rng) {
-  return Kernel<ExitEffects>::WalkAlone(stack, w, rng);
+  return stack.diffuse_base() ? Kernel<ExitEffects<true>>::WalkAlone(stack, w, rng)
+                              : Kernel<ExitEffects<false>>::WalkAlone(stack, w, rng);
 }
 
 }  // namespace patina::layered

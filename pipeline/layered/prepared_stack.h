@@ -59,6 +59,8 @@ struct PreparedStack {
   int parts = 0;  // of the base; 0: black
   PreparedPart base[kMaxParts];
   Effects effects;
+
+  bool diffuse_base() const { return parts == 1 && base[0].kind == BaseKind::kDiffuse; }
 };
 
 // The stack must be valid (CheckStack).

@@ -67,16 +67,23 @@ class Kernel {
     Kernel kernel(stack, *rng);
     kernel.wo_ = wo;
     const Colour<E> mirrored = kernel.Mirrored(wi, wo);
+    // Summed up here: stores through the arguments could change the stack, for all that the
+    // compiler knows, which would then compute anew for each path what is the same for all.
+    double sums[3], sums_of_squares[3];
+    std::copy_n(sum, 3, sums);
+    std::copy_n(squares, 3, sums_of_squares);
     for (int path = 0; path < paths; ++path) {
       kernel.total_ = mirrored;
       kernel.StartWayOut(wo);
       if (kernel.Enter(wi)) kernel.Walk();
       for (int c = 0; c < 3; ++c) {
         const double f = kernel.total_.v[E::kColour ? c : 0];
-        sum[c] += f;
-        squares[c] += f * f;
+        sums[c] += f;
+        sums_of_squares[c] += f * f;
       }
     }
+    std::copy_n(sums, 3, sum);
+    std::copy_n(sums_of_squares, 3, squares);
     *rng = kernel.rng_;
   }
 
@@ -450,19 +457,16 @@ class Kernel {
 
   PATINA_WALK_INLINE bool MeetBase() {
     ++events_;
-    if (stack_.parts == 0) [[unlikely]]
+    if (!E::kDiffuseBase && stack_.parts == 0) [[unlikely]]
       return false;
     const Vec w = -direction_;
     const int layer = CurrentLayer();
-    const bool single = stack_.parts == 1;
-    const bool diffuse = single && stack_.base[0].kind == BaseKind::kDiffuse;
     if (HasWayOut(layer)) {
       const Vec& o = out_.direction[layer];
       double value[kChannels];
       double pdf = o.z / kPi;
-      if (diffuse) {
-        const PreparedPart& part = stack_.base[0];
-        for (int c = 0; c < kChannels; ++c) value[c] = part.albedo[c] * pdf;
+      if constexpr (E::kDiffuseBase) {
+        for (int c = 0; c < kChannels; ++c) value[c] = stack_.base[0].albedo[c] * pdf;
       } else {
         pdf = EvaluateBase(stack_, w, o, value);
       }
@@ -472,14 +476,14 @@ class Kernel {
       if (pdf > 0) Connect(layer, value, pdf, out_.reach[layer], 0);
     }
     int chosen = 0;
-    if (!single) {
+    if (!E::kDiffuseBase && stack_.parts > 1) {
       double u = Uniform(&rng_);
       while (chosen + 1 < stack_.parts && u >= stack_.base[chosen].share)
         u -= stack_.base[chosen++].share;
     }
     const PreparedPart& part = stack_.base[chosen];
     depth_ = stack_.media[layer].thickness;
-    if (part.kind == BaseKind::kDiffuse) {
+    if (E::kDiffuseBase || part.kind == BaseKind::kDiffuse) {
       const double u = Uniform(&rng_);
       double sine, cosine;
       SinCosTurns(Uniform(&rng_), &sine, &cosine);
@@ -503,7 +507,7 @@ class Kernel {
     }
     only_smooth_ = false;
     links_ = 1;
-    if (diffuse) {
+    if constexpr (E::kDiffuseBase) {
       pdf_ = direction_.z / kPi;
       for (int c = 0; c < kChannels; ++c) light_.v[c] *= part.albedo[c];
       return true;
