@@ -11,7 +11,7 @@
 namespace patina {
 
 // Raised whenever the same source, job and seed would give other bytes. Part of the fingerprint.
-inline constexpr int kSvbrdfRecipeVersion = 1;
+inline constexpr int kSvbrdfRecipeVersion = 2;
 
 // The model's shape for a source of this size: the recipe's, with what the job says in its place.
 // isotropic: as VaryingSource::isotropic.

@@ -2,52 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
+
+#include "pipeline/base/symmetric_eigen.h"
 
 namespace patina {
-namespace {
-
-// Eigenvectors of a symmetric matrix by cyclic Jacobi rotations; columns of `vectors`. Fine for 64 x 64.
-void SymmetricEigen(int n, std::vector<double>* matrix, std::vector<double>* vectors) {
-  auto& a = *matrix;
-  auto& v = *vectors;
-  v.assign(static_cast<size_t>(n) * n, 0.0);
-  for (int i = 0; i < n; ++i) v[i * n + i] = 1;
-  for (int sweep = 0; sweep < 60; ++sweep) {
-    double off = 0, diagonal = 0;
-    for (int i = 0; i < n; ++i) {
-      diagonal += a[i * n + i] * a[i * n + i];
-      for (int j = i + 1; j < n; ++j) off += a[i * n + j] * a[i * n + j];
-    }
-    if (off <= 1e-26 * diagonal) return;
-    for (int p = 0; p < n; ++p) {
-      for (int q = p + 1; q < n; ++q) {
-        const double apq = a[p * n + q];
-        if (apq == 0) continue;
-        const double theta = (a[q * n + q] - a[p * n + p]) / (2 * apq);
-        const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-        for (int k = 0; k < n; ++k) {
-          const double akp = a[k * n + p], akq = a[k * n + q];
-          a[k * n + p] = c * akp - s * akq;
-          a[k * n + q] = s * akp + c * akq;
-        }
-        for (int k = 0; k < n; ++k) {
-          const double apk = a[p * n + k], aqk = a[q * n + k];
-          a[p * n + k] = c * apk - s * aqk;
-          a[q * n + k] = s * apk + c * aqk;
-        }
-        for (int k = 0; k < n; ++k) {
-          const double vkp = v[k * n + p], vkq = v[k * n + q];
-          v[k * n + p] = c * vkp - s * vkq;
-          v[k * n + q] = s * vkp + c * vkq;
-        }
-      }
-    }
-  }
-}
-
-}  // namespace
 
 std::vector<float> ChannelWeights(const MaterialReference& reference) {
   std::vector<float> weight(reference.pyramid.channels, 0.0f);
@@ -105,19 +64,16 @@ ChannelStats MeasureChannels(const MaterialReference& reference, int mip, Thread
     for (int j = i; j < n; ++j) covariance[j * n + i] = covariance[i * n + j] /= count;
     stats.deviation[i] = static_cast<float>(std::sqrt(std::max(0.0, covariance[i * n + i])));
   }
-  std::vector<double> scaled(covariance), vectors;
+  std::vector<double> scaled(covariance);
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) scaled[i * n + j] *= std::sqrt(static_cast<double>(stats.weight[i]) * stats.weight[j]);
   }
-  SymmetricEigen(n, &scaled, &vectors);
-  std::vector<int> order(n);
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return scaled[a * n + a] > scaled[b * n + b]; });
-  for (const int k : order) {
+  const SymmetricEigen eigen = EigenOf(n, std::move(scaled));
+  for (int k = 0; k < n; ++k) {
     std::vector<float> component(n);
-    for (int c = 0; c < n; ++c) component[c] = static_cast<float>(vectors[c * n + k] / std::sqrt(double{stats.weight[c]}));
+    for (int c = 0; c < n; ++c) component[c] = static_cast<float>(eigen.vectors[k * n + c] / std::sqrt(double{stats.weight[c]}));
     stats.component.push_back(std::move(component));
-    stats.sigma.push_back(static_cast<float>(std::sqrt(std::max(0.0, scaled[k * n + k]))));
+    stats.sigma.push_back(static_cast<float>(std::sqrt(std::max(0.0, eigen.values[k]))));
   }
   return stats;
 }

@@ -15,8 +15,8 @@ namespace {
 
 constexpr int kProducts = 6;
 constexpr int kBlocksPerTask = 64;
-constexpr float kSpread = 0.25f;
-constexpr float kMostDeviations = 3.5f;
+constexpr size_t kRowsPerTask = 4096;
+constexpr double kMostFromOne = 0.875;
 
 ModelShape StoreShape(const TextureShape& shape) {
   ModelShape model{};
@@ -211,34 +211,47 @@ size_t NeuralTexture::state_bytes() const {
   return floats * sizeof(float);
 }
 
-void NeuralTexture::Normalise(std::span<FeatureAffine> affine, ThreadPool& pool) {
-  constexpr float kLeastDeviation = 1e-3f;  // features that are the same everywhere stay so
-  const auto rows = static_cast<size_t>(shape_.texels());
-  for (int f = 0; f < shape_.features(); ++f) {
-    double sum = 0, squares = 0;
-    for (size_t r = 0; r < rows; ++r) sum += static_cast<double>(values_[r * kRowFloats + f]);
-    const double mean = sum / static_cast<double>(rows);
-    for (size_t r = 0; r < rows; ++r) {
-      const double d = static_cast<double>(values_[r * kRowFloats + f]) - mean;
-      squares += d * d;
-    }
-    const float deviation = std::max(
-        kLeastDeviation, static_cast<float>(std::sqrt(squares / static_cast<double>(rows))));
-    const float scale = deviation / kSpread;
-    affine[f] = {static_cast<float>(mean) - scale, scale};
-    for (FeatureLevel& level : store_.textures[f / 3]) {
-      for (int block = 0; block < level.block_count(); ++block) {
-        float* texels = level.params.data() +
-                        static_cast<size_t>(block) * BlockStride(BlockForm::kFree) + f % 3 * 16;
-        for (int k = 0; k < 16; ++k) {
-          const float z = (texels[k] - static_cast<float>(mean)) / deviation;
-          texels[k] = 1 + kSpread * std::clamp(z, -kMostDeviations, kMostDeviations);
-        }
-      }
+TexelMoments NeuralTexture::Moments() const {
+  const auto n = static_cast<size_t>(shape_.features()), rows = static_cast<size_t>(shape_.texels());
+  TexelMoments moments{std::vector<double>(n), std::vector<double>(n * n)};
+  for (size_t r = 0; r < rows; ++r) {
+    for (size_t f = 0; f < n; ++f)
+      moments.mean[f] += static_cast<double>(values_[r * kRowFloats + f]);
+  }
+  for (double& mean : moments.mean) mean /= static_cast<double>(rows);
+  std::vector<double> d(n);
+  for (size_t r = 0; r < rows; ++r) {
+    for (size_t f = 0; f < n; ++f)
+      d[f] = static_cast<double>(values_[r * kRowFloats + f]) - moments.mean[f];
+    for (size_t f = 0; f < n; ++f) {
+      for (size_t g = 0; g < n; ++g) moments.covariance[f * n + g] += d[f] * d[g];
     }
   }
+  for (double& covariance : moments.covariance) covariance /= static_cast<double>(rows);
+  return moments;
+}
+
+void NeuralTexture::Rebase(const FeatureBasis& basis, ThreadPool& pool) {
+  const auto n = static_cast<size_t>(shape_.features());
+  std::vector<float> places(values_.size());
+  const auto rows = static_cast<size_t>(shape_.texels());
+  const size_t tasks = (rows + kRowsPerTask - 1) / kRowsPerTask;
+  pool.ParallelFor(static_cast<int>(tasks), [&](int task, int) {
+    const size_t first = static_cast<size_t>(task) * kRowsPerTask;
+    const size_t end = std::min(rows, first + kRowsPerTask);
+    for (size_t r = first; r < end; ++r) {
+      for (size_t place = 0; place < n; ++place) {
+        double y = 0;
+        for (size_t f = 0; f < n; ++f)
+          y += basis.forward[place * n + f] *
+               (static_cast<double>(values_[r * kRowFloats + f]) - basis.mean[f]);
+        places[r * kRowFloats + place] =
+            static_cast<float>(1 + std::clamp(y, -kMostFromOne, kMostFromOne));
+      }
+    }
+  });
+  Start(places, pool);
   store_.ResetMoments();
-  DecodeAll(pool);
 }
 
 void NeuralTexture::UseBlocks(ThreadPool& pool) {

@@ -14,6 +14,7 @@
 #include "formats/bc6h.h"
 #include "pipeline/brdf/texture_part.h"
 #include "pipeline/material/feature_store.h"
+#include "pipeline/svbrdf/feature_basis.h"
 #include "pipeline/svbrdf/texture_kernels.h"
 
 namespace patina::svbrdf {
@@ -37,10 +38,10 @@ struct TexelTap {
 };
 TexelTap TexelTapAt(float coordinate, int side, AddressMode address);
 
-// x = offset + scale * y of a feature.
-struct FeatureAffine {
-  float offset = 0;
-  float scale = 1;
+// Of the texels of all levels alike.
+struct TexelMoments {
+  std::vector<double> mean;        // [feature]
+  std::vector<double> covariance;  // [feature][feature]
 };
 
 class NeuralTexture : public brdf::TexturePart {
@@ -62,9 +63,10 @@ class NeuralTexture : public brdf::TexturePart {
   // The step of the next Update; 0 leaves the texture as it is.
   void SetRates(float texel, float index) { rates_.endpoint = texel, rates_.index = index; }
 
-  // Brings every feature of a free texture x to 1 + (x - mean) / (4 deviation), within 1 +- 7/8, so
-  // that BC6H holds it well. affine [features()]: what undoes it.
-  void Normalise(std::span<FeatureAffine> affine, ThreadPool& pool);
+  TexelMoments Moments() const;
+  // Puts the places y of the basis in place of the features, within 1 +- 7/8, so that BC6H holds
+  // them well. The texels are free.
+  void Rebase(const FeatureBasis& basis, ThreadPool& pool);
   // Goes over from free texels to blocks that are fitted to them.
   void UseBlocks(ThreadPool& pool);
   // Makes legal blocks of what was trained; errors cost what the products of gradients say. The

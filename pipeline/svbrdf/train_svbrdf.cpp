@@ -164,38 +164,77 @@ class Session {
     trainer_.UseCodebook(std::move(codes), std::move(index));
   }
 
+  // The gradients of many samples; what is trained stays.
+  template <class Visit>
+  void VisitManyGradients(Visit&& visit) {
+    const size_t count = std::min(kSensitivitySamples, train_count_);
+    const size_t piece = batch_.samples.size();
+    for (size_t first = 0; first + piece <= count; first += piece) {
+      Fill(first, &batch_);
+      trainer_.VisitGradients(batch_.samples.data(), piece, batch_.taps.data(), visit);
+    }
+  }
+
   // The texture becomes blocks of what BC6H can hold, and the first layer reads it as before.
   void StartBlocks() {
-    std::vector<FeatureAffine> affine(static_cast<size_t>(shape_.texture.features()));
-    texture_.Normalise(affine, threads_);
-    const brdf::DenseLayer& layer = layout_.layers[0];
-    float* weights = trainer_.parameters().data() + layer.weights;
-    float* bias = weights + static_cast<size_t>(layer.inputs) * layer.outputs;
-    for (size_t f = 0; f < affine.size(); ++f) {
-      float* row = weights + (2 * static_cast<size_t>(layout_.feature_stride) + f) * layer.outputs;
-      for (int n = 0; n < layer.outputs; ++n) {
-        bias[n] += row[n] * affine[f].offset;
-        row[n] *= affine[f].scale;
+    const auto n = static_cast<size_t>(shape_.texture.features());
+    const size_t first = 2 * static_cast<size_t>(layout_.feature_stride);
+    std::vector<double> importance(n * n);
+    double samples = 0;
+    VisitManyGradients([&](size_t, int rows, const brdf::ChunkResult& result) {
+      for (int s = 0; s < rows; ++s) {
+        const float* g = result.feature_gradient.data() +
+                         static_cast<size_t>(s) * layout_.feature_columns() + first;
+        for (size_t i = 0; i < n; ++i) {
+          for (size_t j = 0; j < n; ++j)
+            importance[i * n + j] += static_cast<double>(g[i]) * static_cast<double>(g[j]);
+        }
       }
-    }
-    trainer_.ParametersChanged();
+      samples += rows;
+    });
+    for (double& product : importance) product /= samples;
+    TexelMoments moments = texture_.Moments();
+    const FeatureBasis basis =
+        PrincipalBasis(std::move(moments.mean), moments.covariance, importance);
+    texture_.Rebase(basis, threads_);
+    ReadThrough(basis);
     trainer_.ForgetMoments();
     texture_.UseBlocks(threads_);
+  }
+
+  // Makes the first layer take the places of the basis for the features that they stand for.
+  void ReadThrough(const FeatureBasis& basis) {
+    const size_t n = basis.mean.size();
+    const brdf::DenseLayer& layer = layout_.layers[0];
+    const auto outputs = static_cast<size_t>(layer.outputs);
+    float* weights = trainer_.parameters().data() + layer.weights;
+    float* bias = weights + static_cast<size_t>(layer.inputs) * outputs;
+    float* rows = weights + 2 * static_cast<size_t>(layout_.feature_stride) * outputs;
+    std::vector<double> of_place(n);
+    for (size_t o = 0; o < outputs; ++o) {
+      double offset = 0;
+      of_place.assign(n, 0);
+      for (size_t f = 0; f < n; ++f) {
+        const auto weight = static_cast<double>(rows[f * outputs + o]);
+        offset += weight * basis.mean[f];
+        for (size_t place = 0; place < n; ++place)
+          of_place[place] += weight * basis.backward[f * n + place];
+      }
+      for (size_t place = 0; place < n; ++place) {
+        rows[place * outputs + o] = static_cast<float>(of_place[place]);
+        offset -= of_place[place];
+      }
+      bias[o] += static_cast<float>(offset);
+    }
+    trainer_.ParametersChanged();
   }
 
   void FixTexture() {
     if (options_.form == TextureForm::kHalves) return texture_.RoundToHalves();
     std::vector<float> sums = texture_.MakeSensitivity();
-    const size_t count = std::min(kSensitivitySamples, train_count_);
-    const size_t piece = batch_.samples.size();
-    for (size_t first = 0; first + piece <= count; first += piece) {
-      Fill(first, &batch_);
-      trainer_.VisitGradients(batch_.samples.data(), piece, batch_.taps.data(),
-                              [&](size_t at, int rows, const brdf::ChunkResult& result) {
-                                texture_.AddSensitivity(batch_.taps.data() + at, rows, result,
-                                                        sums);
-                              });
-    }
+    VisitManyGradients([&](size_t at, int rows, const brdf::ChunkResult& result) {
+      texture_.AddSensitivity(batch_.taps.data() + at, rows, result, sums);
+    });
     texture_.Encode(sums, threads_);
     for (int t = 0; t < shape_.texture.textures; ++t) result_.blocks[t] = texture_.blocks()[t];
   }

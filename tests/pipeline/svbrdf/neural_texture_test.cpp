@@ -184,23 +184,43 @@ TEST(NeuralTexture, BlocksLearnAndBecomeLegal) {
   }
 }
 
-TEST(NeuralTexture, NormalisesSoThatTheNetworkSeesTheSame) {
-  Fixture fixture(8, 8, 1, 1, Best());
+TEST(NeuralTexture, RebasesSoThatTheNetworkSeesTheSame) {
+  Fixture fixture(8, 8, 2, 1, Best());
   ASSERT_TRUE(fixture.Step(
-      0, [](size_t row, int f) { return f == 2         ? 0.0f
-                                        : row % 2 == 0 ? 1.0f
-                                                       : -1.0f; }, 3, 0));
-  std::vector<float> before(fixture.texture.rows(), fixture.texture.rows() + 64 * kRowFloats);
-  std::vector<FeatureAffine> affine(3);
-  fixture.texture.Normalise(affine, fixture.pool);
-  for (size_t row = 0; row < 64; ++row) {
-    for (int f = 0; f < 3; ++f) {
-      const float y = fixture.At(row, f);
-      EXPECT_NEAR(affine[f].offset + affine[f].scale * y, before[row * kRowFloats + f], 1e-5f);
-      EXPECT_GE(y, 0.125f);
-      EXPECT_LE(y, 1.875f);
+      0, [](size_t row, int f) { return f == 2                      ? 0.0f
+                                        : row % (f == 0 ? 2 : 3) == 0 ? 1.0f
+                                                                      : -1.0f; }, 3, 0));
+  const auto rows = static_cast<size_t>(fixture.shape.texels());
+  const std::vector<float> before(fixture.texture.rows(),
+                                  fixture.texture.rows() + rows * kRowFloats);
+  TexelMoments moments = fixture.texture.Moments();
+  for (size_t f = 0; f < 3; ++f) {
+    for (size_t g = 0; g < 3; ++g) {
+      double sums[3] = {0, 0, 0};
+      for (size_t row = 0; row < rows; ++row) {
+        const auto x = static_cast<double>(before[row * kRowFloats + f]);
+        const auto y = static_cast<double>(before[row * kRowFloats + g]);
+        sums[0] += x, sums[1] += y, sums[2] += x * y;
+      }
+      for (double& sum : sums) sum /= static_cast<double>(rows);
+      EXPECT_NEAR(moments.mean[f], sums[0], 1e-6);
+      EXPECT_NEAR(moments.covariance[3 * f + g], sums[2] - sums[0] * sums[1], 1e-5);
     }
-    EXPECT_EQ(fixture.At(row, 2), 1);  // the same everywhere
+  }
+  const FeatureBasis basis =
+      PrincipalBasis(moments.mean, moments.covariance, std::vector<double>{1, 0, 0, 0, 4, 0, 0, 0, 1});
+  fixture.texture.Rebase(basis, fixture.pool);
+  for (size_t row = 0; row < rows; ++row) {
+    for (size_t f = 0; f < 3; ++f) {
+      double x = basis.mean[f];
+      for (size_t place = 0; place < 3; ++place) {
+        const float y = fixture.At(row, static_cast<int>(place));
+        x += basis.backward[3 * f + place] * (static_cast<double>(y) - 1);
+        EXPECT_GE(y, 0.125f);
+        EXPECT_LE(y, 1.875f);
+      }
+      EXPECT_NEAR(x, static_cast<double>(before[row * kRowFloats + f]), 1e-4);
+    }
   }
 }
 
