@@ -37,14 +37,12 @@ std::string Word(bool value) { return value ? "true" : "false"; }
 }  // namespace
 
 Status MatchTexture(const ManifestFeature& feature, const DdsTexture& texture) {
-  const bool is_signed = feature.format == "BC6H_SF16";
+  const std::string format = TextureFormatName(texture.format);
   if (texture.width != feature.width || texture.height != feature.height ||
-      texture.levels.size() != static_cast<size_t>(feature.levels) ||
-      (texture.format == bc6h::Format::kSf16) != is_signed) {
+      texture.level_count() != feature.levels || format != feature.format) {
     return Fail(ErrorCode::kCorruptData,
                 std::to_string(texture.width) + "x" + std::to_string(texture.height) +
-                    " texels in " + std::to_string(texture.levels.size()) + " levels, " +
-                    (texture.format == bc6h::Format::kSf16 ? "BC6H_SF16" : "BC6H_UF16") +
+                    " texels in " + std::to_string(texture.level_count()) + " levels, " + format +
                     ", but the manifest says " + std::to_string(feature.width) + "x" +
                     std::to_string(feature.height) + ", " + std::to_string(feature.levels) +
                     " levels, " + feature.format);

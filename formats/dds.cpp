@@ -41,9 +41,22 @@ enum Offset : int {
   kArraySizeAt = 140
 };
 
+constexpr uint16_t kHalfOne = 0x3C00;
+constexpr uint64_t kHalfTexelBytes = DataTexelBytes(DataFormat::kRgba16Float);
+
 uint64_t LevelBlocks(int width, int height, int level) {
   return static_cast<uint64_t>(DdsBlocks(DdsLevelSide(width, level))) *
          static_cast<uint64_t>(DdsBlocks(DdsLevelSide(height, level)));
+}
+
+uint64_t LevelTexels(int width, int height, int level) {
+  return static_cast<uint64_t>(DdsLevelSide(width, level)) *
+         static_cast<uint64_t>(DdsLevelSide(height, level));
+}
+
+uint64_t LevelBytes(TextureFormat format, int width, int height, int level) {
+  return format == TextureFormat::kRgba16f ? LevelTexels(width, height, level) * kHalfTexelBytes
+                                           : LevelBlocks(width, height, level) * bc6h::kBlockBytes;
 }
 
 // Fills a zeroed header. size: bytes of level 0 with kFlags, of a row with kDataFlags.
@@ -78,6 +91,46 @@ tl::unexpected<Error> BadHeader(const std::string& field, int offset, uint32_t v
                                            ", not " + wanted);
 }
 
+Status CheckSize(int width, int height, size_t levels) {
+  if (width < 1 || height < 1 || width > kMaxDdsSide || height > kMaxDdsSide) {
+    return Fail(ErrorCode::kInvalidArgument, "a DDS texture of " + SizeText(width, height) +
+                                                 " texels cannot be written: sides are 1 to " +
+                                                 std::to_string(kMaxDdsSide));
+  }
+  const int full = DdsFullChainLevels(width, height);
+  if (levels < 1 || levels > static_cast<size_t>(full)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                std::to_string(levels) + " levels for a DDS texture of " + SizeText(width, height) +
+                    ", which can have 1 to " + std::to_string(full));
+  }
+  return {};
+}
+
+Status CheckCount(size_t level, size_t count, const char* what, uint64_t wanted) {
+  if (count == wanted) return {};
+  return Fail(ErrorCode::kInvalidArgument, "DDS level " + std::to_string(level) + " has " +
+                                               std::to_string(count) + " " + what + " instead of " +
+                                               std::to_string(wanted));
+}
+
+// The header, and room for the levels.
+Result<std::vector<uint8_t>> BeginFile(TextureFormat format, int width, int height, size_t levels) {
+  const uint64_t first = LevelBytes(format, width, height, 0);
+  if (first > UINT32_MAX) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "a DDS texture of " + SizeText(width, height) + " is 4 GiB or more");
+  }
+  uint64_t total = kDdsHeaderBytes;
+  for (size_t level = 0; level < levels; ++level)
+    total += LevelBytes(format, width, height, static_cast<int>(level));
+  std::vector<uint8_t> bytes(total, 0);
+  const bool blocks = format != TextureFormat::kRgba16f;
+  const uint64_t size = blocks ? first : static_cast<uint64_t>(width) * kHalfTexelBytes;
+  PutHeader(bytes.data(), blocks ? kFlags : kDataFlags, static_cast<uint32_t>(size), width, height,
+            levels, static_cast<uint32_t>(format));
+  return bytes;
+}
+
 }  // namespace
 
 int DdsFullChainLevels(int width, int height) {
@@ -86,44 +139,58 @@ int DdsFullChainLevels(int width, int height) {
   return levels;
 }
 
+const char* TextureFormatName(TextureFormat format) {
+  switch (format) {
+    case TextureFormat::kRgba16f:
+      return "RGBA16F";
+    case TextureFormat::kBc6hSf16:
+      return "BC6H_SF16";
+    case TextureFormat::kBc6hUf16:
+      break;
+  }
+  return "BC6H_UF16";
+}
+
 Result<std::vector<uint8_t>> EncodeDds(bc6h::Format format, int width, int height,
                                        std::span<const std::vector<bc6h::Block>> levels) {
-  if (width < 1 || height < 1 || width > kMaxDdsSide || height > kMaxDdsSide) {
-    return Fail(ErrorCode::kInvalidArgument, "a DDS texture of " + SizeText(width, height) +
-                                                 " texels cannot be written: sides are 1 to " +
-                                                 std::to_string(kMaxDdsSide));
-  }
-  const int full = DdsFullChainLevels(width, height);
-  if (levels.empty() || levels.size() > static_cast<size_t>(full)) {
-    return Fail(ErrorCode::kInvalidArgument,
-                std::to_string(levels.size()) + " levels for a DDS texture of " +
-                    SizeText(width, height) + ", which can have 1 to " + std::to_string(full));
-  }
-  uint64_t total = kDdsHeaderBytes;
+  PATINA_TRY(CheckSize(width, height, levels.size()));
   for (size_t level = 0; level < levels.size(); ++level) {
-    const uint64_t blocks = LevelBlocks(width, height, static_cast<int>(level));
-    if (levels[level].size() != blocks) {
-      return Fail(ErrorCode::kInvalidArgument, "DDS level " + std::to_string(level) + " has " +
-                                                   std::to_string(levels[level].size()) +
-                                                   " blocks instead of " + std::to_string(blocks));
-    }
-    total += blocks * bc6h::kBlockBytes;
+    PATINA_TRY(CheckCount(level, levels[level].size(), "blocks",
+                          LevelBlocks(width, height, static_cast<int>(level))));
   }
-  const uint64_t linear_bytes = LevelBlocks(width, height, 0) * bc6h::kBlockBytes;
-  if (linear_bytes > UINT32_MAX) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "a DDS texture of " + SizeText(width, height) + " is 4 GiB or more");
-  }
-
-  std::vector<uint8_t> bytes(total, 0);
-  PutHeader(bytes.data(), kFlags, static_cast<uint32_t>(linear_bytes), width, height, levels.size(),
-            static_cast<uint32_t>(format));
+  PATINA_ASSIGN(std::vector<uint8_t> bytes,
+                BeginFile(static_cast<TextureFormat>(format), width, height, levels.size()));
   uint8_t* out = bytes.data() + kDdsHeaderBytes;
   for (const auto& level : levels) {
     std::memcpy(out, level.data(), level.size() * sizeof(bc6h::Block));
     out += level.size() * sizeof(bc6h::Block);
   }
   return bytes;
+}
+
+Result<std::vector<uint8_t>> EncodeHalvesDds(int width, int height,
+                                             std::span<const std::vector<uint16_t>> levels) {
+  PATINA_TRY(CheckSize(width, height, levels.size()));
+  for (size_t level = 0; level < levels.size(); ++level) {
+    PATINA_TRY(CheckCount(level, levels[level].size(), "halves",
+                          3 * LevelTexels(width, height, static_cast<int>(level))));
+  }
+  PATINA_ASSIGN(std::vector<uint8_t> bytes,
+                BeginFile(TextureFormat::kRgba16f, width, height, levels.size()));
+  uint8_t* out = bytes.data() + kDdsHeaderBytes;
+  for (const auto& level : levels) {
+    for (size_t i = 0; i < level.size(); i += 3, out += kHalfTexelBytes) {
+      for (size_t c = 0; c < 3; ++c) StoreLittle16(out + 2 * c, level[i + c]);
+      StoreLittle16(out + 6, kHalfOne);
+    }
+  }
+  return bytes;
+}
+
+Result<std::vector<uint8_t>> EncodeDds(const DdsTexture& texture) {
+  if (!texture.has_blocks()) return EncodeHalvesDds(texture.width, texture.height, texture.halves);
+  return EncodeDds(static_cast<bc6h::Format>(texture.format), texture.width, texture.height,
+                   texture.levels);
 }
 
 std::vector<uint8_t> EncodeDataDds(DataFormat format, int width, int height,
@@ -156,14 +223,14 @@ Result<DdsTexture> ParseDds(std::span<const uint8_t> bytes) {
   }
   if ((get(kPixelFormatFlagsAt) & kPixelFormatFourCc) == 0 || get(kFourCcAt) != kDx10) {
     return Fail(ErrorCode::kUnsupported,
-                "a DDS file without a DX10 header; only BC6H with one is read");
+                "a DDS file without a DX10 header; only BC6H and RGBA16F with one are read");
   }
-  const uint32_t format = get(kDxgiFormatAt);
-  if (format != static_cast<uint32_t>(bc6h::Format::kUf16) &&
-      format != static_cast<uint32_t>(bc6h::Format::kSf16)) {
+  const auto format = static_cast<TextureFormat>(get(kDxgiFormatAt));
+  if (format != TextureFormat::kBc6hUf16 && format != TextureFormat::kBc6hSf16 &&
+      format != TextureFormat::kRgba16f) {
     return Fail(ErrorCode::kUnsupported,
-                "DXGI format " + std::to_string(format) +
-                    " at byte 128; only 95 (BC6H_UF16) and 96 (BC6H_SF16) are read");
+                "DXGI format " + std::to_string(get(kDxgiFormatAt)) +
+                    " at byte 128; only 95 (BC6H_UF16), 96 (BC6H_SF16) and 10 (RGBA16F) are read");
   }
   if (get(kDimensionAt) != kDimensionTexture2d || get(kArraySizeAt) != 1 ||
       (get(kMiscFlagAt) & kMiscTextureCube) != 0) {
@@ -178,7 +245,7 @@ Result<DdsTexture> ParseDds(std::span<const uint8_t> bytes) {
   if (height < 1 || height > kMaxDdsSide) {
     return BadHeader("height", kHeightAt, height, "1 to " + std::to_string(kMaxDdsSide));
   }
-  texture.format = static_cast<bc6h::Format>(format);
+  texture.format = format;
   texture.width = static_cast<int>(width);
   texture.height = static_cast<int>(height);
   const uint32_t levels = std::max(1u, get(kMipCountAt));  // 0 means 1 in files of some tools
@@ -188,7 +255,7 @@ Result<DdsTexture> ParseDds(std::span<const uint8_t> bytes) {
   }
   uint64_t wanted = kDdsHeaderBytes;
   for (int level = 0; level < static_cast<int>(levels); ++level) {
-    wanted += LevelBlocks(texture.width, texture.height, level) * bc6h::kBlockBytes;
+    wanted += LevelBytes(format, texture.width, texture.height, level);
   }
   if (bytes.size() < wanted) {
     return Fail(ErrorCode::kCorruptData, "truncated: " + std::to_string(bytes.size()) + " of the " +
@@ -202,6 +269,16 @@ Result<DdsTexture> ParseDds(std::span<const uint8_t> bytes) {
                                              std::to_string(bytes.size()));
   }
   const uint8_t* in = bytes.data() + kDdsHeaderBytes;
+  if (!texture.has_blocks()) {
+    for (int level = 0; level < static_cast<int>(levels); ++level) {
+      std::vector<uint16_t>& halves = texture.halves.emplace_back();
+      halves.resize(3 * LevelTexels(texture.width, texture.height, level));
+      for (size_t i = 0; i < halves.size(); i += 3, in += kHalfTexelBytes) {
+        for (size_t c = 0; c < 3; ++c) halves[i + c] = LoadLittle16(in + 2 * c);
+      }
+    }
+    return texture;
+  }
   texture.levels.resize(levels);
   for (int level = 0; level < static_cast<int>(levels); ++level) {
     auto& blocks = texture.levels[level];
@@ -227,7 +304,8 @@ Result<DdsTexture> ReadDds(const std::string& path, uint64_t max_bytes) {
 }
 
 std::vector<uint16_t> DecodeDdsLevel(const DdsTexture& texture, int level) {
-  PATINA_CHECK(level >= 0 && static_cast<size_t>(level) < texture.levels.size());
+  PATINA_CHECK(level >= 0 && level < texture.level_count());
+  if (!texture.has_blocks()) return texture.halves[static_cast<size_t>(level)];
   const int width = DdsLevelSide(texture.width, level);
   const int height = DdsLevelSide(texture.height, level);
   const int across = DdsBlocks(width);
@@ -236,7 +314,7 @@ std::vector<uint16_t> DecodeDdsLevel(const DdsTexture& texture, int level) {
     for (int bx = 0; bx < across; ++bx) {
       uint16_t block[16][3];
       bc6h::Decode(texture.levels[level][static_cast<size_t>(by) * across + bx].data(),
-                   texture.format, block);
+                   static_cast<bc6h::Format>(texture.format), block);
       const int columns = std::min(4, width - 4 * bx);
       for (int y = 0; y < std::min(4, height - 4 * by); ++y) {
         std::memcpy(&texels[(static_cast<size_t>(4 * by + y) * width + 4 * bx) * 3], block[4 * y],

@@ -1,5 +1,5 @@
-// DDS files with a DX10 header that hold one BC6H texture and its mip chain. Byte table:
-// FORMATS.md.
+// DDS files with a DX10 header that hold one texture of three features and its mip chain, as BC6H
+// blocks or as halves. Byte table: FORMATS.md.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,25 @@ namespace patina {
 inline constexpr int kDdsHeaderBytes = 148;
 inline constexpr int kMaxDdsSide = 65536;
 
+// The values are DXGI formats. RGBA16F stands for three halves and an alpha of 1, as DXGI has no
+// three halves without it.
+enum class TextureFormat : uint32_t { kRgba16f = 10, kBc6hUf16 = 95, kBc6hSf16 = 96 };
+// As manifests have it: "RGBA16F", "BC6H_UF16", "BC6H_SF16".
+const char* TextureFormatName(TextureFormat format);
+
 struct DdsTexture {
-  bc6h::Format format = bc6h::Format::kUf16;
+  TextureFormat format = TextureFormat::kBc6hUf16;
   int width = 0;  // of level 0, texels
   int height = 0;
-  // levels[l]: blocks of the level of DdsLevelSide(width, l) x DdsLevelSide(height, l) texels,
-  // row-major, DdsBlocks(side) across and down. Texels of a block beyond the edge mean nothing.
+  // Of BC6H. levels[l]: blocks of the level of DdsLevelSide(width, l) x DdsLevelSide(height, l)
+  // texels, row-major, DdsBlocks(side) across and down. Texels of a block beyond the edge mean
+  // nothing.
   std::vector<std::vector<bc6h::Block>> levels;
+  // Of RGBA16F. halves[l]: bits of the texels of the level, [y][x][rgb], row-major.
+  std::vector<std::vector<uint16_t>> halves;
+
+  bool has_blocks() const { return format != TextureFormat::kRgba16f; }
+  int level_count() const { return static_cast<int>(has_blocks() ? levels.size() : halves.size()); }
 };
 
 inline int DdsLevelSide(int side, int level) {
@@ -36,11 +48,16 @@ int DdsFullChainLevels(int width, int height);
 // chain, a level with a wrong number of blocks, a level 0 of 4 GiB or more).
 Result<std::vector<uint8_t>> EncodeDds(bc6h::Format format, int width, int height,
                                        std::span<const std::vector<bc6h::Block>> levels);
+// The same of texels as bits of halves, levels[l]: [y][x][rgb], row-major; any value is written.
+Result<std::vector<uint8_t>> EncodeHalvesDds(int width, int height,
+                                             std::span<const std::vector<uint16_t>> levels);
+// Whichever of the two the texture's format calls for.
+Result<std::vector<uint8_t>> EncodeDds(const DdsTexture& texture);
 
-// Reads what EncodeDds writes, and the same kind of file from other tools (flags and linear size
-// are not checked). Errors: kCorruptData, with a message that starts with "bad magic", "bad
-// header", "truncated" or "trailing bytes"; kUnsupported for another format, a volume, a cube map
-// or an array.
+// Reads what these write, and the same kind of files from other tools (flags, linear size or pitch,
+// and alpha are not checked). Errors: kCorruptData, with a message that starts with "bad magic",
+// "bad header", "truncated" or "trailing bytes"; kUnsupported for another format, a volume, a cube
+// map or an array.
 Result<DdsTexture> ParseDds(std::span<const uint8_t> bytes);
 
 // The same for files; errors name the file. Reading refuses files above max_bytes with kOutOfRange.

@@ -50,15 +50,6 @@ enum Flag : uint32_t {
 };
 enum MapCoding : uint8_t { kBitmap = 0, kRuns = 1 };
 
-uint32_t Load16(const uint8_t* bytes) {
-  return static_cast<uint32_t>(bytes[0]) | static_cast<uint32_t>(bytes[1]) << 8;
-}
-
-void Store16(uint8_t* bytes, uint32_t value) {
-  bytes[0] = static_cast<uint8_t>(value & 0xFF);
-  bytes[1] = static_cast<uint8_t>(value >> 8 & 0xFF);
-}
-
 // Of the file with the checksum's own four bytes as zeros.
 uint32_t FileCrc(std::span<const uint8_t> bytes) {
   const uint8_t zeros[4] = {};
@@ -96,7 +87,7 @@ void AppendHalves(std::span<const uint16_t> halves, std::vector<uint8_t>* bytes)
 std::vector<uint16_t> LoadHalves(const uint8_t* from, size_t count) {
   std::vector<uint16_t> halves(count);
   for (uint16_t& half : halves) {
-    half = static_cast<uint16_t>(Load16(from));
+    half = LoadLittle16(from);
     from += 2;
   }
   return halves;
@@ -348,7 +339,7 @@ class Body {
 
 Status ParseCodebookOfPack(std::span<const uint8_t> header, Body* body, IndexPack* pack) {
   const uint32_t entries = LoadLittle32(&header[kEntriesAt]);
-  const uint32_t name_bytes = Load16(&header[kNameBytesAt]);
+  const uint32_t name_bytes = LoadLittle16(&header[kNameBytesAt]);
   if ((entries == 0) == (name_bytes == 0)) {
     return Corrupt("bad header: " + std::to_string(entries) + " entries at byte 32 and a name of " +
                    std::to_string(name_bytes) + " bytes at byte 56: one of them must be 0");
@@ -408,8 +399,8 @@ Result<IndexPack> ParseBarePack(std::span<const uint8_t> bytes) {
   PATINA_TRY(CheckHeader(bytes, kPackMagic, kIndexPackVersion, "index pack"));
   const uint8_t* header = bytes.data();
   IndexPack pack;
-  pack.nside = static_cast<int>(Load16(header + kNsideAt));
-  pack.primitive_size = static_cast<int>(Load16(header + kPrimitiveSizeAt));
+  pack.nside = static_cast<int>(LoadLittle16(header + kNsideAt));
+  pack.primitive_size = static_cast<int>(LoadLittle16(header + kPrimitiveSizeAt));
   pack.index_bits = header[kIndexBitsAt];
   PATINA_TRY(HeaderError(CheckSizes(pack.nside, pack.primitive_size, pack.index_bits)));
   const uint32_t flags = LoadLittle32(header + kFlagsAt);
@@ -460,13 +451,13 @@ Result<Codebook> ParseBareCodebook(std::span<const uint8_t> bytes) {
   PATINA_TRY(CheckHeader(bytes, kCodebookMagic, kCodebookVersion, "codebook"));
   const uint8_t* header = bytes.data();
   Codebook codebook;
-  codebook.primitive_size = static_cast<int>(Load16(header + kPrimitiveSizeAt));
+  codebook.primitive_size = static_cast<int>(LoadLittle16(header + kPrimitiveSizeAt));
   PATINA_TRY(HeaderError(CheckSizes(1, codebook.primitive_size, 1)));
   const uint32_t entries = LoadLittle32(header + kEntriesAt);
   const size_t count = size_t{entries} * static_cast<size_t>(codebook.primitive_size);
   const bool reserved =
       std::any_of(header + kIndexBitsAt, header + kHeaderBytes, [](uint8_t b) { return b != 0; });
-  if (LoadLittle32(header + kFlagsAt) != 0 || Load16(header + kNsideAt) != 0 || reserved)
+  if (LoadLittle32(header + kFlagsAt) != 0 || LoadLittle16(header + kNsideAt) != 0 || reserved)
     return Corrupt("bad header: a reserved byte is not 0");
   if (entries < 1 || entries > 65536 || kHeaderBytes + 2 * count != bytes.size()) {
     return Corrupt("bad header: " + std::to_string(entries) + " entries at byte 32 in a file of " +
@@ -496,14 +487,14 @@ Result<std::vector<uint8_t>> EncodeIndexPack(const IndexPack& pack, int zstd_lev
                                        (pack.canonical_order ? uint32_t{kCanonicalOrder} : 0) |
                                        (pack.angle_inputs ? uint32_t{kAngleInputs} : 0) |
                                        (pack.half_vector_inputs ? uint32_t{kHalfVectorInputs} : 0));
-  Store16(&header[kNsideAt], static_cast<uint32_t>(pack.nside));
-  Store16(&header[kPrimitiveSizeAt], static_cast<uint32_t>(pack.primitive_size));
+  StoreLittle16(&header[kNsideAt], static_cast<uint16_t>(pack.nside));
+  StoreLittle16(&header[kPrimitiveSizeAt], static_cast<uint16_t>(pack.primitive_size));
   header[kIndexBitsAt] = static_cast<uint8_t>(pack.index_bits);
   header[kInterpolationAt] = static_cast<uint8_t>(pack.interpolation);
 
   std::vector<uint8_t> body;
   if (shared) {
-    Store16(&header[kNameBytesAt], static_cast<uint32_t>(pack.codebook_file.size()));
+    StoreLittle16(&header[kNameBytesAt], static_cast<uint16_t>(pack.codebook_file.size()));
     for (size_t i = 0; i < kShaBytes; ++i) {
       const auto digit = [&](char c) { return c <= '9' ? c - '0' : c - 'a' + 10; };
       body.push_back(static_cast<uint8_t>(digit(pack.codebook_sha256[2 * i]) << 4 |
@@ -557,7 +548,7 @@ Result<std::vector<uint8_t>> EncodeCodebook(const Codebook& codebook, int zstd_l
   PATINA_TRY(CheckHalves(codebook.halves, codebook.primitive_size, 65536));
   std::array<uint8_t, kHeaderBytes> header{};
   const size_t entries = codebook.halves.size() / static_cast<size_t>(codebook.primitive_size);
-  Store16(&header[kPrimitiveSizeAt], static_cast<uint32_t>(codebook.primitive_size));
+  StoreLittle16(&header[kPrimitiveSizeAt], static_cast<uint16_t>(codebook.primitive_size));
   StoreLittle32(&header[kEntriesAt], static_cast<uint32_t>(entries));
   std::vector<uint8_t> body;
   AppendHalves(codebook.halves, &body);

@@ -75,7 +75,7 @@ struct ManifestFeature {
   int height = 0;
   int levels = 0;
   int lod_bias = 0;  // added to s to get the level; 0 or negative
-  std::string format = "BC6H_UF16";
+  std::string format = "BC6H_UF16";  // or "BC6H_SF16"; of kind "svbrdf" also "RGBA16F"
 };
 
 // outputs = W2 relu(W1 inputs + b1) + b2

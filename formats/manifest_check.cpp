@@ -151,8 +151,12 @@ Status CheckFeatures(const Manifest& manifest) {
     PATINA_TRY(manifest.lod_range ? PartOfChain(at, feature.width, feature.height, feature.levels)
                                   : FullChain(at, feature.width, feature.height, feature.levels));
     PATINA_TRY(InRange(at + "/lod_bias", feature.lod_bias, -31, 0));
-    PATINA_TRY(
-        OneOf(at + "/format", feature.format, {"BC6H_UF16", "BC6H_SF16"}, ErrorCode::kUnsupported));
+    // Blocks are what a material is made of; a neural texture may do without them.
+    PATINA_TRY(manifest.kind == "svbrdf"
+                   ? OneOf(at + "/format", feature.format, {"BC6H_UF16", "BC6H_SF16", "RGBA16F"},
+                           ErrorCode::kUnsupported)
+                   : OneOf(at + "/format", feature.format, {"BC6H_UF16", "BC6H_SF16"},
+                           ErrorCode::kUnsupported));
   }
   return {};
 }

@@ -23,11 +23,17 @@ Status CheckTexture(const Container& container, const ManifestFeature& feature) 
   return matches ? Status() : Fail(std::move(matches).error(), path);
 }
 
+// Tables have this format, too, and name it as DXGI does.
+std::string BindingFormat(const ManifestFeature& feature) {
+  return feature.format == TextureFormatName(TextureFormat::kRgba16f) ? "RGBA16_FLOAT"
+                                                                      : feature.format;
+}
+
 void ListTexture(ShaderDraft* draft, const ManifestFeature& feature, size_t index) {
   draft->textures.push_back({{"name", "patina_feature_" + std::to_string(index)},
                              {"binding", draft->next_binding()},
                              {"container_file", feature.payload},
-                             {"format", feature.format},
+                             {"format", BindingFormat(feature)},
                              {"width", feature.width},
                              {"height", feature.height},
                              {"levels", feature.levels}});

@@ -716,7 +716,7 @@ class Decoder {
     if (!network_payload.empty() && !ReadWeights(directory + "/" + network_payload, failure))
       return false;
     for (const nlohmann::json& feature : *features) {
-      if (!ReadTexture(feature, directory, manifest_path, failure)) return false;
+      if (!ReadTexture(feature, directory, manifest_path, false, failure)) return false;
     }
     return true;
   }
@@ -840,9 +840,10 @@ class Decoder {
     return true;
   }
 
-  // A feature texture: DDS with DX10 header, 148 bytes, then the levels, largest first.
+  // A feature texture: DDS with DX10 header, 148 bytes, then the levels, largest first, as blocks
+  // or, where that is legal, halves.
   bool ReadTexture(const nlohmann::json& feature, const std::string& directory,
-                   const std::string& manifest_path, Failure* failure) {
+                   const std::string& manifest_path, bool halves_are_legal, Failure* failure) {
     using namespace decoder_detail;
     const std::string place = manifest_path + ": /features/" + std::to_string(textures_.size());
     const int width = Integer(Member(feature, "width"), 1, kMaxSide);
@@ -854,16 +855,21 @@ class Decoder {
     if (width < 1 || height < 1 || levels < 1 || lod_bias < -31 || !IsPlainName(name)) {
       return failure->Set(LoadStatus::kCorrupt, place + " is not legal");
     }
-    if (format != "BC6H_UF16" && format != "BC6H_SF16") {
+    const bool is_halves = halves_are_legal && format == "RGBA16F";
+    if (format != "BC6H_UF16" && format != "BC6H_SF16" && !is_halves) {
       return failure->Set(LoadStatus::kUnsupported,
-                          place + "/format is neither BC6H_UF16 nor BC6H_SF16");
+                          place + "/format is neither BC6H_UF16 nor BC6H_SF16" +
+                              (halves_are_legal ? " nor RGBA16F" : ""));
     }
     const bool is_signed = format == "BC6H_SF16";
-    const auto blocks = [](int side) { return static_cast<size_t>((side + 3) / 4); };
+    // Along a side of a level: texels of 8 bytes, or blocks of 16.
+    const auto units = [&](int side) {
+      return static_cast<size_t>(is_halves ? side : (side + 3) / 4);
+    };
     uint64_t file_bytes = 148;
     for (int level = 0; level < levels; ++level) {
-      file_bytes +=
-          uint64_t{16} * blocks(LevelSide(width, level)) * blocks(LevelSide(height, level));
+      file_bytes += uint64_t{is_halves ? 8u : 16u} * units(LevelSide(width, level)) *
+                    units(LevelSide(height, level));
     }
     const std::string path = directory + "/" + name;
     std::string bytes;
@@ -875,7 +881,7 @@ class Decoder {
     }
     const auto is = [&](size_t offset, uint32_t value) { return Load32(bytes, offset) == value; };
     if (!is(0, 0x20534444) || !is(4, 124) || !is(76, 32) || !is(84, 0x30315844) ||
-        !is(128, is_signed ? 96 : 95) || !is(132, 3) || !is(140, 1) ||
+        !is(128, is_halves ? 10 : is_signed ? 96 : 95) || !is(132, 3) || !is(140, 1) ||
         !is(12, static_cast<uint32_t>(height)) || !is(16, static_cast<uint32_t>(width)) ||
         !is(28, static_cast<uint32_t>(levels))) {
       return failure->Set(LoadStatus::kCorrupt,
@@ -883,35 +889,60 @@ class Decoder {
     }
     Texture texture;
     texture.lod_bias = lod_bias;
-    const std::vector<float>& values = HalfValues();
-    const auto* block = reinterpret_cast<const uint8_t*>(bytes.data()) + 148;
+    const auto* from = reinterpret_cast<const uint8_t*>(bytes.data()) + 148;
     for (int index = 0; index < levels; ++index) {
       TextureLevel level;
       level.width = LevelSide(width, index);
       level.height = LevelSide(height, index);
-      const size_t plane = static_cast<size_t>(level.width) * static_cast<size_t>(level.height);
-      level.texels.resize(3 * plane);
-      for (int by = 0; by < level.height; by += 4) {
-        for (int bx = 0; bx < level.width; bx += 4, block += 16) {
-          uint16_t texels[16][3];
-          DecodeBc6h(block, is_signed, texels);
-          for (int y = by; y < std::min(by + 4, level.height); ++y) {
-            for (int x = bx; x < std::min(bx + 4, level.width); ++x) {
-              const uint16_t* rgb = texels[(y - by) * 4 + (x - bx)];
-              float* to = level.texels.data() +
-                          static_cast<size_t>(y) * static_cast<size_t>(level.width) + x;
-              for (size_t c = 0; c < 3; ++c) {
-                if (!decoder_detail::HalfIsFinite(rgb[c]))
-                  return failure->Set(LoadStatus::kCorrupt, path + ": a texel is infinite");
-                to[c * plane] = values[rgb[c]];
-              }
-            }
-          }
-        }
-      }
+      level.texels.resize(3 * static_cast<size_t>(level.width) * static_cast<size_t>(level.height));
+      if (!(is_halves ? FillFromHalves(from, &level) : FillFromBlocks(from, is_signed, &level)))
+        return failure->Set(LoadStatus::kCorrupt, path + ": a texel is not finite");
+      from += size_t{is_halves ? 8u : 16u} * units(level.width) * units(level.height);
       texture.levels.push_back(std::move(level));
     }
     textures_.push_back(std::move(texture));
+    return true;
+  }
+
+  // The texels of a level from their bytes; false if one is not finite.
+  static bool FillFromBlocks(const uint8_t* block, bool is_signed,
+                             decoder_detail::TextureLevel* level) {
+    for (int by = 0; by < level->height; by += 4) {
+      for (int bx = 0; bx < level->width; bx += 4, block += 16) {
+        uint16_t texels[16][3];
+        decoder_detail::DecodeBc6h(block, is_signed, texels);
+        for (int y = by; y < std::min(by + 4, level->height); ++y) {
+          for (int x = bx; x < std::min(bx + 4, level->width); ++x) {
+            if (!SetTexel(x, y, texels[(y - by) * 4 + (x - bx)], level)) return false;
+          }
+        }
+      }
+    }
+    return true;
+  }
+
+  // Red, green, blue, and an alpha that means nothing.
+  static bool FillFromHalves(const uint8_t* bytes, decoder_detail::TextureLevel* level) {
+    for (int y = 0; y < level->height; ++y) {
+      for (int x = 0; x < level->width; ++x, bytes += 8) {
+        uint16_t rgb[3];
+        for (int c = 0; c < 3; ++c)
+          rgb[c] = static_cast<uint16_t>(bytes[2 * c] | bytes[2 * c + 1] << 8);
+        if (!SetTexel(x, y, rgb, level)) return false;
+      }
+    }
+    return true;
+  }
+
+  static bool SetTexel(int x, int y, const uint16_t rgb[3], decoder_detail::TextureLevel* level) {
+    const size_t width = static_cast<size_t>(level->width);
+    const size_t plane = width * static_cast<size_t>(level->height);
+    float* to = level->texels.data() + static_cast<size_t>(y) * width + static_cast<size_t>(x);
+    const std::vector<float>& values = decoder_detail::HalfValues();
+    for (size_t c = 0; c < 3; ++c) {
+      if (!decoder_detail::HalfIsFinite(rgb[c])) return false;
+      to[c * plane] = values[rgb[c]];
+    }
     return true;
   }
 

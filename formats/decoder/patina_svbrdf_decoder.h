@@ -91,7 +91,7 @@ class SvbrdfDecoder {
     }
     texture_.wrap_ = address == "wrap";
     for (size_t t = 0; t < count && failure.status == Decoder::LoadStatus::kOk; ++t)
-      texture_.ReadTexture(features[t], directory, manifest_path, &failure);
+      texture_.ReadTexture(features[t], directory, manifest_path, true, &failure);
     if (failure.status != Decoder::LoadStatus::kOk) return Failed(failure, problem);
     const TextureLevel& first = texture_.textures_[0].levels[0];
     texture_.width_ = first.width;

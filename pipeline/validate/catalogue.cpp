@@ -83,20 +83,23 @@ constexpr FindingKind kCatalogue[] = {
 
     {2001, kE, "dds-magic", "A feature texture does not begin like a DDS file.", kBakeOrCopy},
     {2002, kE, "dds-header", "A field of a DDS header has an impossible value.", kBakeOrCopy},
-    {2003, kE, "dds-unsupported", "A feature texture is not a BC6H texture with a DX10 header.",
-     "Write it as BC6H with a DX10 header, as `patina bake` does."},
+    {2003, kE, "dds-unsupported",
+     "A feature texture is neither a BC6H nor an RGBA16F texture with a DX10 header.",
+     "Write it as one of these with a DX10 header, as `patina bake` does."},
     {2004, kE, "dds-truncated", "A feature texture ends too early.", kBakeOrCopy},
     {2005, kE, "dds-trailing", "There are bytes behind the last level of a feature texture.",
      kBakeOrCopy},
     {2006, kE, "dds-manifest",
      "Size, levels or format of a feature texture are not those of the manifest.", kBake},
     {2007, kW, "dds-not-canonical",
-     "A header field that decoders pass over (flags, pitch, caps, reserved) is not what FORMATS.md "
-     "says.",
-     "Write the header as FORMATS.md says; some engines look at these fields."},
+     "What decoders pass over (flags, pitch, caps and reserved fields of the header; alpha) is not "
+     "what FORMATS.md says.",
+     "Write it as FORMATS.md says; some engines look at these fields."},
     {2101, kE, "bc6h-reserved-mode", "A BC6H block has a reserved mode and decodes to zeros.",
      kBakeOrCopy},
     {2102, kE, "bc6h-not-finite", "A BC6H block decodes to a value that is not finite.",
+     kBakeOrCopy},
+    {2103, kE, "halves-not-finite", "A texel of an RGBA16F texture is infinite or not a number.",
      kBakeOrCopy},
 
     {3001, kE, "weights-magic", "The weights do not begin with PATINAWT.", kBakeOrCopy},

@@ -6,6 +6,7 @@
 #include "formats/bc6h.h"
 #include "formats/brdf_sampler.h"
 #include "formats/container_match.h"
+#include "formats/half.h"
 #include "pipeline/validate/check_container.h"
 
 namespace patina::validate {
@@ -13,21 +14,22 @@ namespace {
 
 constexpr int kModeBitsOfMinusInfinity = 0x0F;  // see FORMATS.md, section 4
 
-// A texture of a million bad blocks is one finding, not a million.
-struct BadBlocks {
+// A texture of a million bad blocks or texels is one finding, not a million.
+struct BadPlaces {
+  const char* what = "block";
   uint64_t count = 0;
   uint64_t first_offset = 0;
-  std::string first;
+  std::string first = {};
 };
 
-void Note(BadBlocks* bad, size_t level, size_t block, size_t across, uint64_t offset) {
+void Note(BadPlaces* bad, size_t level, size_t index, size_t across, uint64_t offset) {
   if (bad->count++ != 0) return;
   bad->first_offset = offset;
-  bad->first = "block (" + std::to_string(block % across) + ", " + std::to_string(block / across) +
-               ") of level " + std::to_string(level);
+  bad->first = std::string(bad->what) + " (" + std::to_string(index % across) + ", " +
+               std::to_string(index / across) + ") of level " + std::to_string(level);
 }
 
-void Report(int number, const BadBlocks& bad, const std::string& file, const char* what,
+void Report(int number, const BadPlaces& bad, const std::string& file, const char* what,
             FindingList* findings) {
   if (bad.count == 0) return;
   std::string message = bad.first + " " + what;
@@ -46,14 +48,14 @@ bool DecodesToInfinity(const bc6h::Block& block) {
   bc6h::Decode(block.data(), bc6h::Format::kSf16, texels);
   for (const auto& texel : texels) {
     for (const uint16_t half : texel) {
-      if ((half & 0x7C00) == 0x7C00) return true;
+      if (!HalfIsFinite(half)) return true;
     }
   }
   return false;
 }
 
 void CheckBlocks(const DdsTexture& texture, const std::string& file, FindingList* findings) {
-  BadBlocks reserved, infinite;
+  BadPlaces reserved, infinite;
   uint64_t offset = kDdsHeaderBytes;
   for (size_t level = 0; level < texture.levels.size(); ++level) {
     const auto across =
@@ -61,12 +63,27 @@ void CheckBlocks(const DdsTexture& texture, const std::string& file, FindingList
     const std::vector<bc6h::Block>& blocks = texture.levels[level];
     for (size_t b = 0; b < blocks.size(); ++b, offset += bc6h::kBlockBytes) {
       if (IsReserved(blocks[b])) Note(&reserved, level, b, across, offset);
-      if (texture.format == bc6h::Format::kSf16 && DecodesToInfinity(blocks[b]))
+      if (texture.format == TextureFormat::kBc6hSf16 && DecodesToInfinity(blocks[b]))
         Note(&infinite, level, b, across, offset);
     }
   }
   Report(2101, reserved, file, "has a reserved mode", findings);
   Report(2102, infinite, file, "decodes to minus infinity", findings);
+}
+
+void CheckHalves(const DdsTexture& texture, const std::string& file, FindingList* findings) {
+  constexpr uint64_t kTexelBytes = DataTexelBytes(DataFormat::kRgba16Float);
+  BadPlaces bad{"texel"};
+  uint64_t offset = kDdsHeaderBytes;
+  for (size_t level = 0; level < texture.halves.size(); ++level) {
+    const auto across = static_cast<size_t>(DdsLevelSide(texture.width, static_cast<int>(level)));
+    const std::vector<uint16_t>& halves = texture.halves[level];
+    for (size_t i = 0; i < halves.size(); i += 3, offset += kTexelBytes) {
+      if (!HalfIsFinite(halves[i]) || !HalfIsFinite(halves[i + 1]) || !HalfIsFinite(halves[i + 2]))
+        Note(&bad, level, i / 3, across, offset);
+    }
+  }
+  Report(2103, bad, file, "is infinite or not a number", findings);
 }
 
 // Where the writer would have put another byte.
@@ -116,9 +133,8 @@ void CheckTexture(const Manifest& manifest, const ManifestPayload& payload,
       findings->AddError(2006, file, matches.error());
   }
   CheckBlocks(*texture, file, findings);
-  CompareWithWriter(2007, file,
-                    EncodeDds(texture->format, texture->width, texture->height, texture->levels),
-                    bytes, findings);
+  CheckHalves(*texture, file, findings);
+  CompareWithWriter(2007, file, EncodeDds(*texture), bytes, findings);
 }
 
 void CheckWeights(const Manifest& manifest, bool used, std::span<const uint8_t> bytes,

@@ -220,8 +220,8 @@ std::vector<float> RowsOf(const svbrdf::TrainedSvbrdf& model) {
   const svbrdf::TextureShape& shape = model.shape.texture;
   std::vector<float> rows(static_cast<size_t>(shape.texels()) * svbrdf::kRowFloats);
   for (int t = 0; t < shape.textures; ++t) {
-    DdsTexture dds{bc6h::Format::kUf16, shape.width, shape.height,
-                   model.blocks[static_cast<size_t>(t)]};
+    DdsTexture dds{TextureFormat::kBc6hUf16, shape.width, shape.height,
+                   model.blocks[static_cast<size_t>(t)], {}};
     size_t row = 0;
     for (int l = 0; l < shape.levels; ++l) {
       const std::vector<uint16_t> halves = DecodeDdsLevel(dds, l);

@@ -51,6 +51,41 @@ TEST(DdsEncode, WritesASingleLevelWithoutMipCaps) {
   EXPECT_EQ(LoadLittle32(bytes->data() + 128), 95u);
 }
 
+std::vector<uint8_t> SmallHalves() {
+  Random random(25);
+  return *EncodeHalvesDds(9, 5, test::RandomHalfLevels(random, 9, 5, 4));
+}
+
+TEST(DdsEncodeHalves, WritesHeaderAndTexelsByteForByte) {
+  const std::vector<std::vector<uint16_t>> levels = {
+      {0x3C00, 0xC000, 0x0001, 0x7BFF, 0x8000, 0x1234}, {0xFBFF, 0x0000, 0x83FF}};
+  const auto bytes = EncodeHalvesDds(2, 1, levels);
+  ASSERT_OK(bytes);
+  const uint32_t golden[43] = {
+      0x20534444, 124, 0x0002100F, 1, 2, 2 * 8, 1, 2, 0, 0,
+      0,          0,   0,          0, 0, 0,     0, 0, 0,  // magic .. reserved1
+      32,         4,   0x30315844, 0, 0, 0,     0, 0,     // pixel format
+      0x00401008, 0,   0,          0, 0,                  // caps .. reserved2
+      10,         3,   0,          1, 0,                  // DX10
+      0xC0003C00, 0x3C000001, 0x80007BFF, 0x3C001234,     // level 0, each with an alpha of 1
+      0x0000FBFF, 0x3C0083FF};
+  ASSERT_EQ(bytes->size(), sizeof golden);
+  for (int i = 0; i < 43; ++i)
+    EXPECT_EQ(LoadLittle32(bytes->data() + 4 * i), golden[i]) << "byte " << 4 * i;
+}
+
+TEST(DdsEncodeHalves, RefusesImpossibleTextures) {
+  const std::vector<std::vector<uint16_t>> one(1, std::vector<uint16_t>(3));
+  const auto code = [](const auto& result) { return result.error().code; };
+  ASSERT_OK(EncodeHalvesDds(1, 1, one));
+  EXPECT_EQ(code(EncodeHalvesDds(0, 1, one)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code(EncodeHalvesDds(1, 65537, one)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code(EncodeHalvesDds(2, 1, one)), ErrorCode::kInvalidArgument);
+  EXPECT_EQ(code(EncodeHalvesDds(1, 1, {})), ErrorCode::kInvalidArgument);
+  const std::vector<std::vector<uint16_t>> two(2, std::vector<uint16_t>(3));
+  EXPECT_EQ(code(EncodeHalvesDds(1, 1, two)), ErrorCode::kInvalidArgument);
+}
+
 TEST(DdsEncode, RefusesImpossibleTextures) {
   const std::vector<std::vector<bc6h::Block>> one(1, std::vector<bc6h::Block>(1));
   const auto code = [](const auto& result) { return result.error().code; };
@@ -74,27 +109,68 @@ TEST(DdsParse, GivesBackWhatWasWritten) {
       ASSERT_OK(texture);
       EXPECT_EQ(texture->width, size[0]);
       EXPECT_EQ(texture->height, size[1]);
-      EXPECT_EQ(texture->format, bc6h::Format::kSf16);
+      EXPECT_EQ(texture->format, TextureFormat::kBc6hSf16);
       EXPECT_EQ(texture->levels, blocks);
+      EXPECT_EQ(texture->level_count(), levels);
+      EXPECT_EQ(*EncodeDds(*texture), *bytes);
     }
   }
 }
 
+TEST(DdsParse, GivesBackHalvesAsTheyWere) {
+  Random random(26);
+  const int sizes[][2] = {{1, 1}, {4, 4}, {5, 3}, {33, 17}, {1, 100}};
+  for (const auto& size : sizes) {
+    for (int count = 1; count <= DdsFullChainLevels(size[0], size[1]); ++count) {
+      const auto levels = test::RandomHalfLevels(random, size[0], size[1], count);
+      const auto bytes = EncodeHalvesDds(size[0], size[1], levels);
+      ASSERT_OK(bytes);
+      const auto texture = ParseDds(*bytes);
+      ASSERT_OK(texture);
+      EXPECT_EQ(texture->width, size[0]);
+      EXPECT_EQ(texture->height, size[1]);
+      EXPECT_EQ(texture->format, TextureFormat::kRgba16f);
+      EXPECT_EQ(texture->halves, levels);
+      EXPECT_TRUE(texture->levels.empty());
+      ASSERT_EQ(texture->level_count(), count);
+      for (int level = 0; level < count; ++level)
+        EXPECT_EQ(DecodeDdsLevel(*texture, level), levels[static_cast<size_t>(level)]);
+      EXPECT_EQ(*EncodeDds(*texture), *bytes);
+    }
+  }
+}
+
+TEST(DdsParse, PassesOverAlphaAndTakesHalvesThatAreNotFinite) {
+  std::vector<uint8_t> bytes = SmallHalves();
+  const auto before = ParseDds(bytes);
+  ASSERT_OK(before);
+  bytes[148 + 6] ^= 0xFF;
+  const auto other_alpha = ParseDds(bytes);
+  ASSERT_OK(other_alpha);
+  EXPECT_EQ(other_alpha->halves, before->halves);
+  StoreLittle16(bytes.data() + 148 + 8, 0x7E01);
+  const auto with_nan = ParseDds(bytes);
+  ASSERT_OK(with_nan);
+  EXPECT_EQ(with_nan->halves[0][3], 0x7E01);
+}
+
 TEST(DdsParse, NoticesEveryTruncation) {
-  const std::vector<uint8_t> bytes = SmallFile();
-  for (size_t size = 0; size < bytes.size(); ++size) {
-    const auto result = ParseDds(test::Prefix(bytes, size));
-    ASSERT_FALSE(result) << size;
-    ASSERT_EQ(result.error().code, ErrorCode::kCorruptData);
-    ASSERT_EQ(result.error().message.rfind("truncated", 0), 0u)
-        << size << ": " << result.error().message;
+  for (const std::vector<uint8_t>& bytes : {SmallFile(), SmallHalves()}) {
+    for (size_t size = 0; size < bytes.size(); ++size) {
+      const auto result = ParseDds(test::Prefix(bytes, size));
+      ASSERT_FALSE(result) << size;
+      ASSERT_EQ(result.error().code, ErrorCode::kCorruptData);
+      ASSERT_EQ(result.error().message.rfind("truncated", 0), 0u)
+          << size << ": " << result.error().message;
+    }
   }
 }
 
 TEST(DdsParse, NoticesTrailingBytes) {
-  std::vector<uint8_t> bytes = SmallFile();
-  bytes.push_back(0);
-  EXPECT_EQ(MessageOf(ParseDds(bytes)).rfind("trailing bytes", 0), 0u);
+  for (std::vector<uint8_t> bytes : {SmallFile(), SmallHalves()}) {
+    bytes.push_back(0);
+    EXPECT_EQ(MessageOf(ParseDds(bytes)).rfind("trailing bytes", 0), 0u);
+  }
 }
 
 TEST(DdsParse, NoticesABadMagic) {
@@ -102,13 +178,20 @@ TEST(DdsParse, NoticesABadMagic) {
 }
 
 TEST(DdsParse, NoticesABadHeader) {
-  const std::vector<uint8_t> bytes = SmallFile();
   const std::pair<int, uint32_t> changes[] = {{4, 123}, {76, 0},     {12, 0}, {12, 0xFFFFFFFF},
                                               {16, 0},  {16, 65537}, {28, 5}, {28, 0xFFFFFFFF}};
-  for (const auto& [offset, value] : changes) {
-    const auto result = WithField(bytes, offset, value);
-    EXPECT_EQ(MessageOf(result).rfind("bad header", 0), 0u) << offset << ": " << MessageOf(result);
+  for (const std::vector<uint8_t>& bytes : {SmallFile(), SmallHalves()}) {
+    for (const auto& [offset, value] : changes) {
+      const auto result = WithField(bytes, offset, value);
+      EXPECT_EQ(MessageOf(result).rfind("bad header", 0), 0u)
+          << offset << ": " << MessageOf(result);
+    }
   }
+}
+
+TEST(DdsParse, TakesBlocksAndHalvesForEachOtherOnlyIfTheSizeFits) {
+  EXPECT_EQ(MessageOf(WithField(SmallFile(), 128, 10)).rfind("truncated", 0), 0u);
+  EXPECT_EQ(MessageOf(WithField(SmallHalves(), 128, 95)).rfind("trailing bytes", 0), 0u);
 }
 
 TEST(DdsParse, RefusesOtherKindsOfTextures) {
@@ -123,11 +206,12 @@ TEST(DdsParse, RefusesOtherKindsOfTextures) {
 }
 
 TEST(DdsParse, DoesNotAllocateForSizesThatTheFileDoesNotHold) {
-  std::vector<uint8_t> bytes = SmallFile();
-  StoreLittle32(bytes.data() + 12, 65536);
-  StoreLittle32(bytes.data() + 16, 65536);
-  StoreLittle32(bytes.data() + 28, 17);
-  EXPECT_EQ(MessageOf(ParseDds(bytes)).rfind("truncated", 0), 0u);
+  for (std::vector<uint8_t> bytes : {SmallFile(), SmallHalves()}) {
+    StoreLittle32(bytes.data() + 12, 65536);
+    StoreLittle32(bytes.data() + 16, 65536);
+    StoreLittle32(bytes.data() + 28, 17);
+    EXPECT_EQ(MessageOf(ParseDds(bytes)).rfind("truncated", 0), 0u);
+  }
 }
 
 TEST(DdsParse, TakesMipCountZeroForOne) {

@@ -235,6 +235,7 @@ TEST(Manifest, WriterAndReaderRefuseBrokenRules) {
       {"/features/3/levels", [](Manifest* m) { m->features[3].levels = 2; }},
       {"/features/0/lod_bias", [](Manifest* m) { m->features[0].lod_bias = 1; }},
       {"/features/0/format", [](Manifest* m) { m->features[0].format = "BC7"; }},
+      {"/features/0/format", [](Manifest* m) { m->features[0].format = "RGBA16F"; }},
       {"/features", [](Manifest* m) { m->network.reset(); }},
       {"/network/inputs", [](Manifest* m) { m->features.pop_back(); }},
       {"/network/payload", [](Manifest* m) { m->network->payload = "other"; }},

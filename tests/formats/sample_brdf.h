@@ -130,7 +130,8 @@ struct BrdfSampleOptions {
   std::vector<int> hidden = {16, 16};
   bool shared_codebook = false;
   bool with_sampler = true;
-  int textures = 0;  // of a spatially varying one
+  int textures = 0;     // of a spatially varying one
+  bool halves = false;  // its textures are uncompressed
   int zstd_level = 0;
 };
 
@@ -171,10 +172,24 @@ inline Result<StagingArea> StageBrdfSample(const std::string& out, const std::st
     brdf.layers[0] += 3 * options.textures;
     for (int t = 0; t < options.textures; ++t) {
       const std::string name = "features_" + std::to_string(t) + ".dds";
-      const auto levels = FeatureLevels(random, kWidth, kHeight);
-      PATINA_ASSIGN(const auto dds, EncodeDds(bc6h::Format::kUf16, kWidth, kHeight, levels));
-      PATINA_TRY(staging.AddPayload(name, "features", dds));
-      manifest.features.push_back({name, kWidth, kHeight, static_cast<int>(levels.size())});
+      const int count = DdsFullChainLevels(kWidth, kHeight);
+      DdsTexture dds;
+      dds.width = kWidth;
+      dds.height = kHeight;
+      if (options.halves) {
+        dds.format = TextureFormat::kRgba16f;
+        for (int level = 0; level < count; ++level) {
+          auto& halves = dds.halves.emplace_back();
+          for (int i = 3 * DdsLevelSide(kWidth, level) * DdsLevelSide(kHeight, level); i > 0; --i)
+            halves.push_back(RandomHalf(random, 2));
+        }
+      } else {
+        dds.levels = FeatureLevels(random, kWidth, kHeight);
+      }
+      PATINA_ASSIGN(const auto bytes, EncodeDds(dds));
+      PATINA_TRY(staging.AddPayload(name, "features", bytes));
+      manifest.features.push_back(
+          {name, kWidth, kHeight, count, 0, TextureFormatName(dds.format)});
     }
   }
   brdf.layers.insert(brdf.layers.end(), options.hidden.begin(), options.hidden.end());

@@ -10,6 +10,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/base/little_endian.h"
+#include "formats/schema_check.h"
 #include "formats/shader_constants.h"
 #include "formats/shader_text.h"
 #include "tests/formats/sample_brdf.h"
@@ -75,6 +76,37 @@ TEST(ShaderPackage, SharesTheTextAmongContainersOfOneStructure) {
   ASSERT_OK(b);
   EXPECT_EQ(a->files[0].bytes, b->files[0].bytes);
   EXPECT_NE(a->files[1].bytes, b->files[1].bytes);
+}
+
+TEST(ShaderPackage, IsTheSameShaderForBlocksAndHalves) {
+  const TemporaryDirectory out;
+  test::BrdfSampleOptions options;
+  options.textures = 2;
+  const Container blocks = Publish(test::StageBrdfSample(out.path(), "blocks", 1, options));
+  options.halves = true;
+  const Container halves = Publish(test::StageBrdfSample(out.path(), "halves", 1, options));
+  for (const auto language : {ShaderLanguage::kGlsl, ShaderLanguage::kEssl, ShaderLanguage::kHlsl}) {
+    const auto a = BuildShaderPackage(blocks, {language, 0});
+    const auto b = BuildShaderPackage(halves, {language, 0});
+    ASSERT_OK(a);
+    ASSERT_OK(b);
+    EXPECT_EQ(a->files[0].bytes, b->files[0].bytes);
+    const auto json = nlohmann::json::parse(TextOf(*b, "bindings.json"));
+    const Status fits = CheckAgainstSchema("bindings", json);
+    EXPECT_TRUE(fits) << MessageOf(fits);
+    int features = 0;
+    for (const auto& texture : json["textures"]) {
+      if (!texture.contains("container_file")) continue;
+      ++features;
+      EXPECT_EQ(texture["format"], "RGBA16_FLOAT");
+      EXPECT_EQ(texture["levels"], 4);
+    }
+    EXPECT_EQ(features, 2);
+  }
+  Container wrong = halves;
+  wrong.manifest.features[1].format = "BC6H_UF16";
+  EXPECT_THAT(MessageOf(BuildShaderPackage(wrong, {})),
+              AllOf(HasSubstr("features_1.dds"), HasSubstr("RGBA16F")));
 }
 
 TEST(ShaderPackage, RefusesWhatIsMissingOrDamaged) {

@@ -77,6 +77,20 @@ inline std::vector<std::vector<bc6h::Block>> RandomLevels(Random& random, int wi
   return result;
 }
 
+// Finite halves of three features, of both signs and all sizes; see DdsTexture::halves.
+inline std::vector<std::vector<uint16_t>> RandomHalfLevels(Random& random, int width, int height,
+                                                           int levels) {
+  std::vector<std::vector<uint16_t>> result(static_cast<size_t>(levels));
+  for (int level = 0; level < levels; ++level) {
+    const int count = 3 * DdsLevelSide(width, level) * DdsLevelSide(height, level);
+    for (int i = 0; i < count; ++i) {
+      const auto magnitude = static_cast<uint16_t>(random.Below(0x7C00));
+      result[level].push_back(static_cast<uint16_t>(magnitude | random.Below(2) << 15));
+    }
+  }
+  return result;
+}
+
 // The message of an error, or "" for success.
 template <class T>
 std::string MessageOf(const Result<T>& result) {

@@ -10,15 +10,16 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     FUZZ_CHECK(!texture.error().message.empty());
     return 0;
   }
-  for (int level = 0; level < static_cast<int>(texture->levels.size()); ++level) {
+  for (int level = 0; level < texture->level_count(); ++level) {
     const size_t texels = DecodeDdsLevel(*texture, level).size();
     FUZZ_CHECK(texels == size_t{3} * DdsLevelSide(texture->width, level) *
                              DdsLevelSide(texture->height, level));
   }
-  const auto bytes = EncodeDds(texture->format, texture->width, texture->height, texture->levels);
+  const auto bytes = EncodeDds(*texture);
   FUZZ_CHECK(bytes.has_value() && bytes->size() == size);
   const auto again = ParseDds(*bytes);
-  FUZZ_CHECK(again.has_value() && again->levels == texture->levels);
+  FUZZ_CHECK(again.has_value() && again->levels == texture->levels &&
+             again->halves == texture->halves);
   return 0;
 }
 
@@ -37,6 +38,16 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
     }
     const auto format = count % 2 == 0 ? bc6h::Format::kUf16 : bc6h::Format::kSf16;
     seeds.push_back(EncodeDds(format, width, height, levels).value());
+    std::vector<std::vector<uint16_t>> halves(static_cast<size_t>(count));
+    for (int level = 0; level < count; ++level) {
+      halves[level].resize(size_t{3} * static_cast<size_t>(DdsLevelSide(width, level)) *
+                           static_cast<size_t>(DdsLevelSide(height, level)));
+      for (uint16_t& half : halves[level]) {
+        value = static_cast<uint8_t>(value * 5 + 113);
+        half = static_cast<uint16_t>(value << 8 | value);
+      }
+    }
+    seeds.push_back(EncodeHalvesDds(width, height, halves).value());
   }
   return seeds;
 }

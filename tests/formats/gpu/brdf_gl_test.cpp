@@ -66,6 +66,8 @@ TEST_P(BrdfOnGl, AgreesForSpatiallyVaryingOnes) {
   options.pack.half_vector_inputs = true;
   options.textures = 4;
   Check(options, 170);
+  options.halves = true;
+  Check(options, 172);
   if (GetParam() == GlApi::kEs30) return;
   options.pack.angle_inputs = options.pack.half_vector_inputs = false;
   options.pack.primitive_size = 3;

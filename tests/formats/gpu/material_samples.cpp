@@ -167,7 +167,8 @@ Container CutLevels(const Container& container, int fine, int coarse) {
     feature.height = DdsLevelSide(feature.height, first);
     feature.levels = static_cast<int>(levels.size());
     feature.lod_bias -= first;
-    const auto bytes = EncodeDds(texture.format, feature.width, feature.height, levels);
+    const auto bytes = EncodeDds(static_cast<bc6h::Format>(texture.format), feature.width,
+                                 feature.height, levels);
     EXPECT_TRUE(bytes && WriteFileDurably(container.PathOf(feature.payload), *bytes));
     for (ManifestPayload& payload : cut.manifest.payloads) {
       if (payload.name != feature.payload) continue;

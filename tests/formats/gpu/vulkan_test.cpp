@@ -81,6 +81,13 @@ TEST_P(OnVulkan, BrdfsAgree) {
   CheckBrdfSample(options, 211);
 }
 
+TEST_P(HlslOnVulkan, UncompressedNeuralTexturesAgree) {
+  test::BrdfSampleOptions options;
+  options.textures = 2;
+  options.halves = true;
+  CheckBrdfSample(options, 212);
+}
+
 INSTANTIATE_TEST_SUITE_P(Languages, OnVulkan,
                          testing::Values(ShaderLanguage::kHlsl, ShaderLanguage::kGlsl),
                          [](const auto& language) {
