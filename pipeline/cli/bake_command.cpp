@@ -89,7 +89,10 @@ void Apply(const JobOverrides& overrides, Job* job) {
       std::fprintf(stderr, "patina: warning: %s: a BRDF has no %s; passed over\n",
                    job->asset.c_str(), names.c_str());
     }
-    if (job->kind == JobKind::kSvbrdf) ApplyToMaps(overrides, job);
+    if (job->kind == JobKind::kSvbrdf) {
+      ApplyToMaps(overrides, job);
+      if (overrides.texture_format) job->model.texture_format = overrides.texture_format;
+    }
     return;
   }
   if (overrides.profile) job->choose_profile = *overrides.profile == "auto";
@@ -160,6 +163,20 @@ bool WriteSceneManifests(const std::vector<PlannedJob>& plan, const std::vector<
   return written;
 }
 
+// Of --texture-format: what has no neural texture is not baked as if nothing had been asked for.
+void RefuseWithoutNeuralTexture(std::vector<PlannedJob>* plan) {
+  for (PlannedJob& planned : *plan) {
+    if (!planned.job || planned.job->kind == JobKind::kSvbrdf) continue;
+    const bool set = planned.job->kind == JobKind::kMaterial && planned.job->scene.empty();
+    planned.job = Fail(
+        ErrorCode::kInvalidArgument,
+        std::string("--texture-format is of the neural texture of a spatially varying BRDF, and "
+                    "this is a ") +
+            (planned.job->kind == JobKind::kMaterial ? "material" : "BRDF that does not vary") +
+            "; leave it out" + (set ? ", or add --as svbrdf" : ""));
+  }
+}
+
 // Of --as svbrdf. What is reflectance already stays as it is.
 void BakeSetsAsReflectance(std::vector<PlannedJob>* plan) {
   for (PlannedJob& planned : *plan) {
@@ -212,6 +229,7 @@ std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
   }
   KeepChosenMaterials(options.materials, &plan);
   if (options.as_svbrdf) BakeSetsAsReflectance(&plan);
+  if (options.job.texture_format) RefuseWithoutNeuralTexture(&plan);
   std::set<std::string> taken;
   std::map<std::string, std::string> described;  // where a scene's manifest comes, and whose it is
   for (PlannedJob& planned : plan) {

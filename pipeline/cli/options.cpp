@@ -179,6 +179,10 @@ void AddBake(CLI::App* app, CommandLine* line) {
                    "containers, a little less exact (default 1: each its own)")
       ->check(CLI::Range(1, 64))
       ->type_name("N");
+  AddOverride(command, "--texture-format", &o.job.texture_format,
+              "[spatially varying BRDFs] What the neural texture is stored as: bc6h (default), or "
+              "fp16, uncompressed, which is eight times as large and a little more exact")
+      ->check(CLI::IsMember({"bc6h", "fp16"}));
   AddOverride(command, "--samples", &o.job.samples,
               "[maps] Train with exactly so many samples, in place of --quality's choice")
       ->check(FiniteRange(0.0, 1e12))

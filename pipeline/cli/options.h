@@ -33,6 +33,7 @@ struct JobOverrides {
   std::optional<std::string> working_space;
   std::optional<std::string> color_space;
   std::optional<std::string> ocio;
+  std::optional<std::string> texture_format;
   bool no_report = false;
   bool repair_nonfinite = false;
   bool no_toksvig = false;

@@ -140,9 +140,9 @@ std::string BrdfText(const Manifest& m) {
   text += Format("  %llu bytes for an engine to load\n",
                  static_cast<unsigned long long>(ModelBytes(m.payloads)));
   if (!m.features.empty()) {
-    text += Format("  neural texture: %zu x %d x %d texels, %d mips, %s\n", m.features.size(),
+    text += Format("  neural texture: %zu x %d x %d texels, %d mips, %s, %s\n", m.features.size(),
                    m.features[0].width, m.features[0].height, m.features[0].levels,
-                   brdf.images->address.c_str());
+                   m.features[0].format.c_str(), brdf.images->address.c_str());
   }
   text += "\nSource\n";
   for (const ManifestBrdfFile& file : brdf.files) text += "  " + file.path + "\n";

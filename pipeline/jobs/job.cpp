@@ -207,6 +207,13 @@ void ReadFlag(ObjectReader* reader, const char* key, std::optional<bool>* out) {
   *out = value;
 }
 
+void ReadChoice(ObjectReader* reader, const char* key, std::initializer_list<const char*> choices,
+                std::optional<std::string>* out) {
+  std::string value;
+  reader->Choice(key, choices, &value);
+  if (!value.empty()) *out = value;
+}
+
 JobModel ReadModel(const Json& object, std::vector<std::string>* problems) {
   JobModel model;
   if (!object.is_object()) {
@@ -220,14 +227,13 @@ JobModel ReadModel(const Json& object, std::vector<std::string>* problems) {
   ReadInt(&reader, "hidden", kMinJobHidden, kMaxJobHidden, &model.hidden);
   ReadInt(&reader, "hidden_layers", 1, kMaxJobHiddenLayers, &model.hidden_layers);
   ReadInt(&reader, "textures", 1, kFeatureTextures, &model.textures);
-  std::string interpolation;
-  reader.Choice("interpolation", {"bilinear", "inverse_distance", "uniform"}, &interpolation);
-  if (!interpolation.empty()) model.interpolation = interpolation;
+  ReadChoice(&reader, "texture_format", {"bc6h", "fp16"}, &model.texture_format);
+  ReadChoice(&reader, "interpolation", {"bilinear", "inverse_distance", "uniform"},
+             &model.interpolation);
   ReadFlag(&reader, "angle_inputs", &model.angle_inputs);
   ReadFlag(&reader, "canonical_order", &model.canonical_order);
-  std::string training;
-  reader.Choice("index_training", {"clusters", "softmax", "clusters_then_softmax"}, &training);
-  if (!training.empty()) model.index_training = training;
+  ReadChoice(&reader, "index_training", {"clusters", "softmax", "clusters_then_softmax"},
+             &model.index_training);
   reader.RefuseUnknown();
   return model;
 }
@@ -373,6 +379,8 @@ void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Jo
   }
   if (!varies && job->model.textures)
     reader->Complain("model", "\"textures\" belongs to jobs of kind \"svbrdf\"; leave it out");
+  if (!varies && job->model.texture_format)
+    reader->Complain("model", "\"texture_format\" belongs to jobs of kind \"svbrdf\"; leave it out");
   if (varies && job->model.index_training)
     reader->Complain("model", "\"index_training\" belongs to jobs of kind \"brdf\"; leave it out");
 }

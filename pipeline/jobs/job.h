@@ -44,6 +44,7 @@ struct JobModel {
   std::optional<int> hidden;                 // 4..256
   std::optional<int> hidden_layers;          // 1..4
   std::optional<int> textures;               // 1..4, of a spatially varying BRDF
+  std::optional<std::string> texture_format;  // "bc6h", "fp16", likewise
   std::optional<std::string> interpolation;  // "bilinear", "inverse_distance", "uniform"
   std::optional<bool> angle_inputs;
   std::optional<bool> canonical_order;

@@ -71,6 +71,7 @@ std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
   SetIf("hidden", model.hidden, &json);
   SetIf("hidden_layers", model.hidden_layers, &json);
   SetIf("textures", model.textures, &json);
+  SetIf("texture_format", model.texture_format, &json);
   SetIf("interpolation", model.interpolation, &json);
   SetIf("angle_inputs", model.angle_inputs, &json);
   SetIf("canonical_order", model.canonical_order, &json);
@@ -116,6 +117,8 @@ std::string CanonicalSvbrdfJob(const Job& job, nlohmann::ordered_json json) {
                    {"angle_inputs", shape.model.grid.angle_inputs},
                    {"canonical_order", shape.model.grid.canonical_order},
                    {"textures", shape.texture.textures}};
+  if (TextureFormOfJob(job) == svbrdf::TextureForm::kHalves)
+    json["model"]["texture_format"] = "fp16";
   json["quality"] = QualityName(job.quality);
   json["recipe"] = RecipeName(job.recipe);
   json["seed"] = job.seed;

@@ -112,6 +112,7 @@ void AddErrors(const SvbrdfMeasurement& measurement, Html* html) {
 void AddModel(const PageFacts& facts, const svbrdf::TrainedSvbrdf& model, Html* html) {
   const ManifestBrdf& brdf = *facts.manifest.brdf;
   const svbrdf::TextureShape& texture = model.shape.texture;
+  const bool blocks = model.texels.empty();
   OpenSection("training", "Model and training", html);
   std::string layers;
   for (const int width : brdf.layers)
@@ -129,16 +130,20 @@ void AddModel(const PageFacts& facts, const svbrdf::TrainedSvbrdf& model, Html* 
   rows.insert(
       rows.end(),
       {{"neural texture",
-        std::to_string(texture.textures) + " BC6H textures of " + std::to_string(texture.width) +
-            " " + kTimes + " " + std::to_string(texture.height) + ", " +
-            std::to_string(texture.levels) + " mips, " + AddressModeName(texture.address)},
+        std::to_string(texture.textures) + (blocks ? " BC6H" : " uncompressed fp16") +
+            " textures of " + std::to_string(texture.width) + " " + kTimes + " " +
+            std::to_string(texture.height) + ", " + std::to_string(texture.levels) + " mips, " +
+            AddressModeName(texture.address)},
        {"grid", "Nside " + std::to_string(brdf.nside) + ", " + Spaced(brdf.interpolation)},
        {"codes in use, by perplexity", CountText(model.used_codes)},
        {"network", layers + ", " + brdf.activation},
        {"samples", CountText(model.samples)},
        {"error of log(1 + f cos) of free features and texels", ShortText(model.free_loss, 3)},
-       {"the same of codes and blocks", ShortText(model.block_loss, 3)},
-       {"the same at the end, behind legal blocks", ShortText(model.final_loss, 3)},
+       {blocks ? "the same of codes and blocks" : "the same of codes and free texels",
+        ShortText(model.block_loss, 3)},
+       {blocks ? "the same at the end, behind legal blocks"
+               : "the same at the end, behind texels of half precision",
+        ShortText(model.final_loss, 3)},
        {"steps left out because a value was not finite", std::to_string(model.rollbacks)}});
   AddTrainingFacts(rows, html);
   html->Close();

@@ -13,6 +13,11 @@ svbrdf::SvbrdfShape SvbrdfModelOfJob(const Job& job, int width, int height, Addr
   return shape;
 }
 
+svbrdf::TextureForm TextureFormOfJob(const Job& job) {
+  return job.model.texture_format == "fp16" ? svbrdf::TextureForm::kHalves
+                                            : svbrdf::TextureForm::kBlocks;
+}
+
 svbrdf::ModelledOptions SvbrdfSamplingOfJob(const Job& job, bool exact,
                                             const layered::Outlook& outlook) {
   // Noise of single values is averaged by texels and directions nearby: fewer paths of more pairs
@@ -42,6 +47,7 @@ svbrdf::SvbrdfOptions SvbrdfTrainingOfJob(const Job& job, uint64_t measurements)
   constexpr uint64_t kFew = uint64_t{1} << 20;
   svbrdf::SvbrdfOptions options;
   options.seed = job.seed;
+  options.form = TextureFormOfJob(job);
   if (measurements < kFew) options.batch /= 4;
   const auto scale = [&options](int numerator, int denominator) {
     for (int* steps : {&options.free_steps, &options.block_steps, &options.final_steps})

@@ -18,6 +18,9 @@ inline constexpr int kSvbrdfRecipeVersion = 2;
 svbrdf::SvbrdfShape SvbrdfModelOfJob(const Job& job, int width, int height, AddressMode address,
                                      bool isotropic);
 
+// What the neural texture is stored as: BC6H unless the job says otherwise.
+svbrdf::TextureForm TextureFormOfJob(const Job& job);
+
 // How a model with maps is sampled, by quality. exact, outlook: as TexelModel::exact and LookAhead
 // say.
 svbrdf::ModelledOptions SvbrdfSamplingOfJob(const Job& job, bool exact,

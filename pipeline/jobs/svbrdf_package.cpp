@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/dds.h"
+#include "formats/half.h"
 #include "formats/model_bytes.h"
 #include "pipeline/jobs/brdf_package.h"
 #include "pipeline/jobs/package.h"
@@ -14,6 +15,15 @@ namespace patina {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// Which of the two a model holds.
+svbrdf::TextureForm FormOf(const svbrdf::TrainedSvbrdf& model) {
+  return model.texels.empty() ? svbrdf::TextureForm::kBlocks : svbrdf::TextureForm::kHalves;
+}
+
+TextureFormat FormatOf(svbrdf::TextureForm form) {
+  return form == svbrdf::TextureForm::kHalves ? TextureFormat::kRgba16f : TextureFormat::kBc6hUf16;
+}
 
 std::string FeatureName(int texture) { return "features_" + std::to_string(texture) + ".dds"; }
 
@@ -38,13 +48,44 @@ std::vector<ManifestEffect> EffectsOf(const SvbrdfSource& source, const brdf::Gr
   return effects;
 }
 
+// The three features of a texture in all levels, as DdsTexture::halves.
+Result<std::vector<std::vector<uint16_t>>> HalvesOf(const svbrdf::TrainedSvbrdf& model,
+                                                    int texture) {
+  const svbrdf::TextureShape& shape = model.shape.texture;
+  std::vector<std::vector<uint16_t>> levels;
+  size_t row = 0;
+  for (int l = 0; l < shape.levels; ++l) {
+    std::vector<uint16_t>& level = levels.emplace_back();
+    const size_t texels = static_cast<size_t>(DdsLevelSide(shape.width, l)) *
+                          static_cast<size_t>(DdsLevelSide(shape.height, l));
+    for (size_t i = 0; i < texels; ++i, ++row) {
+      const float* features = model.texels.data() + row * svbrdf::kRowFloats + 3 * texture;
+      for (int c = 0; c < 3; ++c) {
+        level.push_back(FloatToHalf(features[c]));
+        if (!HalfIsFinite(level.back())) {
+          return Fail(ErrorCode::kOutOfRange,
+                      FeatureName(texture) + ": texel " + std::to_string(i) + " of level " +
+                          std::to_string(l) +
+                          " is beyond what halves hold; bake with another seed, or as bc6h");
+        }
+      }
+    }
+  }
+  return levels;
+}
+
 }  // namespace
 
 Status AddSvbrdfModel(const svbrdf::TrainedSvbrdf& model, StagingArea* staging) {
   const svbrdf::TextureShape& texture = model.shape.texture;
   for (int t = 0; t < texture.textures; ++t) {
-    auto bytes = EncodeDds(bc6h::Format::kUf16, texture.width, texture.height,
-                           model.blocks[static_cast<size_t>(t)]);
+    DdsTexture dds{FormatOf(FormOf(model)), texture.width, texture.height, {}, {}};
+    if (dds.has_blocks()) {
+      dds.levels = model.blocks[static_cast<size_t>(t)];
+    } else {
+      PATINA_ASSIGN(dds.halves, HalvesOf(model, t));
+    }
+    auto bytes = EncodeDds(dds);
     if (!bytes) return AsInternal(Fail(bytes.error(), FeatureName(t)));
     PATINA_TRY(staging->AddPayload(FeatureName(t), "features", *bytes));
   }
@@ -62,6 +103,7 @@ Manifest DescribeSvbrdf(const Job& job, const SvbrdfSource& source,
     feature.width = texture.width;
     feature.height = texture.height;
     feature.levels = texture.levels;
+    feature.format = TextureFormatName(FormatOf(TextureFormOfJob(job)));
     manifest.features.push_back(std::move(feature));
   }
   ManifestBrdf model;
@@ -122,10 +164,14 @@ std::string SvbrdfReportToJson(const Manifest& manifest,
                               {"mse", measurement.log1p.mse}};
   if (source.images > 0)
     json["compression_ratio"] = CompressionRatio(described, ModelBytes(payloads));
+  const bool blocks = FormOf(model) == svbrdf::TextureForm::kBlocks;
   json["training"] = {
-      {"samples", model.samples},          {"codes_in_use", model.used_codes},
-      {"log1p_mae_free", model.free_loss}, {"log1p_mae_before_legal_blocks", model.block_loss},
-      {"log1p_mae", model.final_loss},     {"rollbacks", model.rollbacks}};
+      {"samples", model.samples},
+      {"codes_in_use", model.used_codes},
+      {"log1p_mae_free", model.free_loss},
+      {blocks ? "log1p_mae_before_legal_blocks" : "log1p_mae_before_halves", model.block_loss},
+      {"log1p_mae", model.final_loss},
+      {"rollbacks", model.rollbacks}};
   return EndReport(std::move(json), manifest, payloads);
 }
 

@@ -16,7 +16,8 @@
 
 namespace patina {
 
-// Errors of writing are kInternal, since what was trained must be writable.
+// Errors: kOutOfRange (a texel beyond halves). Those of writing are kInternal, since what was
+// trained must be writable.
 Status AddSvbrdfModel(const svbrdf::TrainedSvbrdf& model, StagingArea* staging);
 
 // The manifest without its quality. cost: of what was simulated.

@@ -79,7 +79,8 @@ TEST_F(BakedBtf, IsDescribedAndGood) {
   const std::string page = ReadAll(Container() + "/current/report.html");
   EXPECT_THAT(page, AllOf(HasSubstr("The lit plane"), HasSubstr("times smaller than the images")));
   EXPECT_THAT(Patina({"info", Container()}).out,
-              AllOf(HasSubstr("spatially varying BRDF"), HasSubstr("neural texture: 2 x 16 x 16")));
+              AllOf(HasSubstr("spatially varying BRDF"), HasSubstr("neural texture: 2 x 16 x 16"),
+                    HasSubstr("5 mips, BC6H_UF16, wrap")));
 }
 
 TEST_F(BakedBtf, IsValidAndMeasuredTheSameAgain) {
@@ -177,6 +178,148 @@ TEST_F(BakedBtf, BadSetsAreBadInput) {
   EXPECT_EQ(damaged.exit_code, 3);
   EXPECT_THAT(damaged.err, HasSubstr("/images/6/file"));
   EXPECT_FALSE(fs::exists(folder / "out/bumps/current"));
+}
+
+// Little-endian halves of a file, from a byte on.
+void PutHalf(const std::string& path, std::streamoff at, uint16_t half) {
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(at);
+  const char bytes[2] = {static_cast<char>(half & 0xFF), static_cast<char>(half >> 8)};
+  file.write(bytes, 2);
+  ASSERT_TRUE(file.good());
+}
+
+TEST_F(BakedBtf, UncompressedTexturesAreAnOption) {
+  TempFolder folder;
+  fs::create_directory_symlink(In(), folder / "in");
+  const std::string job = WriteJob(folder / "job.json", "in/bumps.btf.json", "out");
+  const Outcome baked = Patina({"bake", job, "--texture-format", "fp16", "--json"});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  const std::string container = folder / "out/bumps";
+  const Json manifest = Json::parse(ReadAll(container + "/current/manifest.json"));
+  const Status fits = CheckAgainstSchema("manifest", manifest);
+  EXPECT_TRUE(fits) << fits.error().message;
+  const Json blocks = Json::parse(ReadAll(Container() + "/current/manifest.json"));
+  EXPECT_NE(manifest["fingerprint"], blocks["fingerprint"]);
+  EXPECT_EQ(manifest["format_version"], 1);
+  constexpr uint64_t kBytes = 148 + 8 * (256 + 64 + 16 + 4 + 1);
+  for (size_t t = 0; t < 2; ++t) {
+    EXPECT_EQ(manifest["features"][t]["format"], "RGBA16F");
+    EXPECT_EQ(blocks["features"][t]["format"], "BC6H_UF16");
+    EXPECT_EQ(manifest["payloads"][t]["bytes"], kBytes);
+    EXPECT_EQ(fs::file_size(container + "/current/features_" + std::to_string(t) + ".dds"), kBytes);
+  }
+  // No worse than blocks, whose test asks for .8 of the same model.
+  EXPECT_GT(manifest["quality"]["image_ssim"], 0.8);
+  EXPECT_GT(Json::parse(baked.out)["bytes"], 2 * kBytes);
+  EXPECT_THAT(ReadAll(container + "/current/report.html"),
+              AllOf(HasSubstr("2 uncompressed fp16 textures of 16"),
+                    HasSubstr("behind texels of half precision")));
+  EXPECT_THAT(Patina({"info", container}).out, HasSubstr("5 mips, RGBA16F, wrap"));
+
+  const Outcome valid = Patina(
+      {"validate", container, "--against", In() + "/bumps.btf.json", "--fail-on", "warning"});
+  EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
+  const Outcome unpacked = Patina({"unpack", container, "--out", folder / "maps"});
+  const Outcome as_blocks = Patina({"unpack", Container(), "--out", folder / "maps"});
+  EXPECT_EQ(unpacked.exit_code, as_blocks.exit_code);
+  // Through one file and back.
+  ASSERT_EQ(Patina({"pack", container, "-o", folder / "bumps.patina"}).exit_code, 0);
+  ASSERT_EQ(
+      Patina({"unpack-archive", folder / "bumps.patina", "--out", folder / "unpacked"}).exit_code,
+      0);
+  EXPECT_EQ(ReadAll(folder / "unpacked/features_1.dds"),
+            ReadAll(container + "/current/features_1.dds"));
+  const Outcome shader = Patina({"shader", container, "--out", folder / "shader"});
+  EXPECT_EQ(shader.exit_code, 0) << shader.err;
+  const Outcome shader_of_blocks = Patina({"shader", Container(), "--out", folder / "blocks"});
+  EXPECT_EQ(ReadAll(folder / "shader/brdf.glsl"), ReadAll(folder / "blocks/brdf.glsl"));
+  EXPECT_THAT(ReadAll(folder / "shader/bindings.json"), HasSubstr("\"RGBA16_FLOAT\""));
+
+  // The same bytes for other threads.
+  const Outcome again =
+      Patina({"bake", job, "--texture-format", "fp16", "--threads", "3", "--simd", "avx2"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  for (const char* file : {"manifest.json", "features_0.dds", "features_1.dds", "decoder.weights"})
+    EXPECT_EQ(ReadAll(container + "/r0001/" + file), ReadAll(container + "/r0002/" + file)) << file;
+  // What is the default is no other bake.
+  const Outcome named = Patina({"bake", job, "--texture-format", "bc6h"});
+  ASSERT_EQ(named.exit_code, 0) << named.err;
+  for (const char* file : {"manifest.json", "features_0.dds", "features_1.dds"})
+    EXPECT_EQ(ReadAll(container + "/current/" + file), ReadAll(Container() + "/current/" + file));
+}
+
+TEST_F(BakedBtf, UncompressedTexturesThatAreDamagedAreRefused) {
+  TempFolder folder;
+  fs::create_directory_symlink(In(), folder / "in");
+  const std::string job = WriteJob(folder / "job.json", "in/bumps.btf.json", "out");
+  ASSERT_EQ(Patina({"bake", job, "--texture-format", "fp16", "-q"}).exit_code, 0);
+  const std::string good = folder / "out/bumps/r0001";
+  SvbrdfDecoder decoder;
+  std::string problem;
+  ASSERT_EQ(SvbrdfDecoder::Load(good, &decoder, &problem), SvbrdfDecoder::LoadStatus::kOk)
+      << problem;
+  const std::string texture = "/features_1.dds";
+  for (const uint16_t half : {0x7C00, 0xFC00, 0x7E00, 0xFFFF}) {
+    // Of the first texel, one within, and the last.
+    for (const std::streamoff at : {148, 148 + 8 * 100 + 2, 148 + 8 * 340 + 4}) {
+      const std::string copy = folder / "damaged";
+      fs::remove_all(copy);
+      fs::copy(good, copy, fs::copy_options::recursive);
+      PutHalf(copy + texture, at, half);
+      EXPECT_EQ(SvbrdfDecoder::Load(copy, &decoder, &problem), SvbrdfDecoder::LoadStatus::kCorrupt);
+      EXPECT_THAT(problem, AllOf(HasSubstr("features_1.dds"), HasSubstr("not finite")));
+      if (half != 0x7E00) continue;
+      const Outcome found = Patina({"validate", copy});
+      EXPECT_EQ(found.exit_code, 1);
+      EXPECT_THAT(found.out, AllOf(HasSubstr("PAT-2103"), HasSubstr("PAT-1103")));
+    }
+  }
+  // Alpha means nothing to a decoder, but is not what FORMATS.md says.
+  const std::string copy = folder / "alpha";
+  fs::copy(good, copy, fs::copy_options::recursive);
+  PutHalf(copy + texture, 148 + 6, 0x7E00);
+  EXPECT_EQ(SvbrdfDecoder::Load(copy, &decoder, &problem), SvbrdfDecoder::LoadStatus::kOk);
+  EXPECT_THAT(Patina({"validate", copy}).out, HasSubstr("PAT-2007"));
+  // Every length but the right one, and blocks under the name of halves.
+  const uint64_t whole = fs::file_size(good + texture);
+  for (uint64_t size = 0; size < whole; size += size < 160 ? 1 : 97) {
+    fs::resize_file(copy + texture, size);
+    ASSERT_EQ(SvbrdfDecoder::Load(copy, &decoder, &problem), SvbrdfDecoder::LoadStatus::kCorrupt)
+        << size;
+  }
+  fs::copy_file(Container() + "/r0001" + texture, copy + texture,
+                fs::copy_options::overwrite_existing);
+  EXPECT_EQ(SvbrdfDecoder::Load(copy, &decoder, &problem), SvbrdfDecoder::LoadStatus::kCorrupt);
+  Json manifest = Json::parse(ReadAll(copy + "/manifest.json"));
+  manifest["features"][1]["format"] = "RGB16F";
+  std::ofstream(copy + "/manifest.json") << manifest.dump(2);
+  EXPECT_EQ(SvbrdfDecoder::Load(copy, &decoder, &problem), SvbrdfDecoder::LoadStatus::kUnsupported);
+  EXPECT_THAT(problem, HasSubstr("/features/1/format"));
+}
+
+TEST_F(BakedBtf, ATextureFormatIsRefusedWhereThereIsNoNeuralTexture) {
+  TempFolder folder;
+  ASSERT_EQ(Patina({"sample", "--kind", "material", "--out", folder / "floor", "--size", "16"})
+                .exit_code,
+            0);
+  const Outcome material = Patina(
+      {"bake", folder / "floor", "--out", folder / "out", "--texture-format", "fp16"});
+  EXPECT_EQ(material.exit_code, 3);
+  EXPECT_THAT(material.err, AllOf(HasSubstr("--texture-format is of the neural texture"),
+                                  HasSubstr("this is a material"), HasSubstr("--as svbrdf")));
+  EXPECT_FALSE(fs::exists(folder / "out"));
+  const std::string job = folder / "job.json";
+  std::ofstream(job) << Json{{"version", 1},
+                             {"kind", "brdf"},
+                             {"asset", "chrome"},
+                             {"file", "chrome.binary"},
+                             {"out", "out"},
+                             {"model", {{"texture_format", "fp16"}}}};
+  const Outcome brdf = Patina({"bake", job});
+  EXPECT_EQ(brdf.exit_code, 3);
+  EXPECT_THAT(brdf.err, HasSubstr("\"texture_format\" belongs to jobs of kind \"svbrdf\""));
+  EXPECT_EQ(Patina({"bake", In(), "--out", folder / "out", "--texture-format", "bc7"}).exit_code, 2);
 }
 
 // Layers with maps, and a texture set: the same way as measured images.

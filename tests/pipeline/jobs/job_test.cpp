@@ -9,6 +9,7 @@
 #include "formats/base/file_io.h"
 #include "formats/schema_check.h"
 #include "pipeline/jobs/brdf_job.h"
+#include "pipeline/jobs/svbrdf_job.h"
 
 namespace patina {
 namespace {
@@ -460,6 +461,43 @@ TEST(CanonicalJob, NamesTheModelOfABrdf) {
     change(&changed);
     EXPECT_NE(CanonicalJob(a), CanonicalJob(changed));
   }
+}
+
+TEST(CanonicalJob, TellsUncompressedTexturesFromBlocksAndNothingElse) {
+  Job a;
+  a.kind = JobKind::kSvbrdf;
+  a.asset = "cloth";
+  a.file = "cloth.btf.json";
+  // What every container so far has in its fingerprint.
+  EXPECT_EQ(CanonicalJob(a).find("texture_format"), std::string::npos);
+  Job b = a;
+  b.model.texture_format = "bc6h";
+  EXPECT_EQ(CanonicalJob(a), CanonicalJob(b));
+  b.model.texture_format = "fp16";
+  EXPECT_NE(CanonicalJob(a), CanonicalJob(b));
+  EXPECT_EQ(SvbrdfTrainingOfJob(a, 1 << 20).form, svbrdf::TextureForm::kBlocks);
+  EXPECT_EQ(SvbrdfTrainingOfJob(b, 1 << 20).form, svbrdf::TextureForm::kHalves);
+}
+
+TEST(ParseJob, TakesATextureFormatOnlyWhereThereIsANeuralTexture) {
+  auto full = ReadJobFile(Example("job_svbrdf_full.json"));
+  ASSERT_TRUE(full) << full.error().message;
+  EXPECT_EQ(full->model.texture_format, "fp16");
+  auto again = ParseJob(JobToJson(*full), "", "again");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(JobToJson(*again), JobToJson(*full));
+  Json brdf = MinimalBrdf();
+  brdf["model"]["texture_format"] = "fp16";
+  auto refused = ParseJob(brdf.dump(), "", "job.json");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("belongs to jobs of kind \"svbrdf\""));
+  EXPECT_FALSE(CheckAgainstSchema("job", brdf));
+  Json svbrdf = {{"version", 1}, {"kind", "svbrdf"}, {"asset", "a"}, {"file", "f.btf.json"},
+                 {"out", "o"},   {"model", {{"texture_format", "bc7"}}}};
+  auto unknown = ParseJob(svbrdf.dump(), "", "job.json");
+  ASSERT_FALSE(unknown);
+  EXPECT_THAT(unknown.error().message, HasSubstr("/model/texture_format: must be one of bc6h, fp16"));
+  EXPECT_FALSE(CheckAgainstSchema("job", svbrdf));
 }
 
 TEST(AssetNameFromPath, MakesALegalNameOfAnyPath) {
