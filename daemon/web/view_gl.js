@@ -100,10 +100,14 @@ function dataTexture(gl, dds) {
   return texture;
 }
 
-// A texture of a container. BC6H as blocks where the browser takes it, else decoded here to the same half floats:
-// {texture, inPage: why that was so, or ""}.
-export function containerTexture({gl, extensions}, dds, address) {
-  if (!dds.format.startsWith("BC6H")) return {texture: dataTexture(gl, dds), inPage: ""};
+// A texture of a container, filtered if it holds features. BC6H as blocks where the browser takes it, else decoded here to
+// the same half floats: {texture, inPage: why that was so, or ""}.
+export function containerTexture({gl, extensions}, dds, address, isFeature) {
+  if (!isFeature) return {texture: dataTexture(gl, dds), inPage: ""};
+  if (dds.format === "RGBA16_FLOAT") {
+    const levels = dds.levels.map(({width, height, bytes}) => ({width, height, halves: new Uint16Array(bytes.slice().buffer)}));
+    return {texture: halfTexture(gl, levels, address, true), inPage: ""};
+  }
   const isSigned = dds.format === "BC6H_SF16";
   // WebGL takes blocks only where they fill the finest level.
   const inPage = !extensions.bptc ? "this browser has no EXT_texture_compression_bptc"

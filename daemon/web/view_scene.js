@@ -43,12 +43,13 @@ export class Scene {
     this.program = makeProgram(gl, shaders.vertex, shaders.fragment);
     this.others = new Map();
     this.inPage = "";
+    const isFeature = ({name}) => name.startsWith("patina_feature");
     this.textures = textures.map(dds => {
-      const {texture, inPage} = containerTexture(context, dds, bindings.address);
+      const {texture, inPage} = containerTexture(context, dds, bindings.address, isFeature(dds));
       this.inPage = this.inPage || inPage;
       return {name: dds.name, texture};
     });
-    this.features = this.textures.filter(({name}) => name.startsWith("patina_feature")).map(({texture}) => texture);
+    this.features = this.textures.filter(isFeature).map(({texture}) => texture);
     this.isSmooth = true;
     if (source) {
       source.textures.forEach((levels, i) =>

@@ -402,8 +402,11 @@ def bake(patina, scratch, is_quick):
     run("bake", os.path.join(at("wall/brdf"), brdf), *common)
     run("sample", "--kind", "btf", "--out", at("btf"), "--size", "16")
     run("bake", at("btf"), *common)
-    containers = {"material": "maps", "scene": "mosaic_wet_floor", "odd": "odd", "brdf": brdf.split(".")[0], "varying": "bumps"}
-    return {kind: os.path.join(at("baked"), name) for kind, name in containers.items()}, maps
+    run("bake", at("btf"), *common[:-1], at("halves"), "--texture-format", "fp16")
+    names = {"material": "maps", "scene": "mosaic_wet_floor", "odd": "odd", "brdf": brdf.split(".")[0], "varying": "bumps"}
+    containers = {kind: os.path.join(at("baked"), name) for kind, name in names.items()}
+    containers["varying-halves"] = os.path.join(at("halves"), "bumps")
+    return containers, maps
 
 
 def use(page, patina, decoder_values, scratch, folder, is_quick):
@@ -425,11 +428,11 @@ def use(page, patina, decoder_values, scratch, folder, is_quick):
                 check_brdf(page, patina, container, scratch, wrong)
                 pick(page, "shape", "lobe")
                 look(page, "brdf-lobe", folder, wrong)
-            elif name == "varying":
+            elif name.startswith("varying"):
                 check_varying(page, decoder_values, container, wrong)
                 pick(page, "shape", "lobe")
                 drawn(page)
-                page.screenshot(os.path.join(folder, "varying-lobe.png"))
+                page.screenshot(os.path.join(folder, f"{name}-lobe.png"))
             else:
                 check_values(page, decoder_values, container, name, wrong)
                 check_pixels(page, decoder_values, container, name, wrong)
