@@ -396,6 +396,13 @@ Status CheckNeuralTexture(const Manifest& manifest) {
       OneOf("/source/images/address", images.address, {"wrap", "clamp"}, ErrorCode::kUnsupported));
   PATINA_TRY(HexDigest("/source/images/sha256", images.sha256));
   if (manifest.features.empty()) return Bad("/features", "no texture in a spatially varying BRDF");
+  for (size_t i = 0; i < manifest.features.size(); ++i) {
+    const ManifestFeature& feature = manifest.features[i];
+    const Pointer at = "/features/" + std::to_string(i);
+    if (feature.width != images.width) return Bad(at + "/width", "not that of /source/images");
+    if (feature.height != images.height) return Bad(at + "/height", "not that of /source/images");
+    if (feature.lod_bias != 0) return Bad(at + "/lod_bias", "not 0 in a spatially varying BRDF");
+  }
   return CheckFeatures(manifest);
 }
 

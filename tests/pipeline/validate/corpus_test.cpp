@@ -71,6 +71,18 @@ MemoryFiles BrdfCorpus(bool shared_codebook) {
   return files;
 }
 
+// A spatially varying BRDF with an uncompressed texture.
+MemoryFiles VaryingCorpus() {
+  const test::TemporaryDirectory out;
+  test::BrdfSampleOptions options;
+  options.textures = 2;
+  options.halves = true;
+  options.with_sampler = false;
+  auto staging = test::StageBrdfSample(out.path(), "cloth", 4, options);
+  EXPECT_TRUE(staging.has_value()) << test::MessageOf(staging);
+  return MemoryFiles(staging->directory());
+}
+
 // Size and hash of a payload, as whoever forges a container would set them.
 void FixHash(const std::string& name, MemoryFiles* files) {
   ordered_json manifest = ManifestOf(*files);
@@ -103,7 +115,8 @@ bool Found(const MemoryFiles& files) {
 }
 
 TEST(ValidateCorpus, IsValidBeforeItIsBroken) {
-  for (const MemoryFiles& files : {MaterialCorpus(), BrdfCorpus(false), BrdfCorpus(true)}) {
+  for (const MemoryFiles& files :
+       {MaterialCorpus(), BrdfCorpus(false), BrdfCorpus(true), VaryingCorpus()}) {
     for (const Finding& finding : test::FindingsOf(files))
       ADD_FAILURE() << finding.number << " " << finding.pointer << " " << finding.message;
   }
@@ -252,6 +265,9 @@ constexpr Undetectable kUndetectable[] = {
     {"/channels/*/range/*", "value", kDecoded},
     {"/channels/*/constant", "value", kDecoded},
     {"/maps/*/file", "value", kSource},
+    {"/source/images/count", "value", kSource},
+    {"/source/images/address", "value", "either mode decodes"},
+    {"/source/images/sha256", "value", kSource},
     {"/maps/*/type", "value", kSource},
     {"/maps/*/file_channels", "value", kSource},
     {"/maps/*/file_channels/*", "removed value", kSource},
@@ -338,7 +354,8 @@ const Undetectable* Explained(const Mutation& mutation) {
 TEST(ValidateCorpus, EveryChangeOfOneFieldIsFoundOrExplained) {
   size_t total = 0, found = 0;
   std::set<const Undetectable*> needed;
-  for (MemoryFiles files : {MaterialCorpus(), BrdfCorpus(false), BrdfCorpus(true)}) {
+  for (MemoryFiles files :
+       {MaterialCorpus(), BrdfCorpus(false), BrdfCorpus(true), VaryingCorpus()}) {
     const ordered_json manifest = ManifestOf(files);
     for (const Mutation& mutation : Mutations(manifest)) {
       if (mutation.manifest == manifest) continue;
@@ -377,7 +394,10 @@ TEST(ValidateCorpus, ARepeatedKeyIsFound) {
 // another legal payload.
 bool IsFree(const std::string& name, const Bytes& bytes, size_t at) {
   if (name == "report.json") return true;                 // for people
-  if (name.rfind("features_", 0) == 0) return at >= 148;  // other blocks, but for reserved modes
+  if (name.rfind("features_", 0) == 0) {
+    // Other blocks, but for reserved modes; other halves, but for alpha.
+    return at >= 148 && (LoadLittle32(&bytes[128]) != 10 || (at - 148) % 8 < 6);
+  }
   if (name == "decoder.weights") return at >= 64 + 64 * LoadLittle32(&bytes[12]);
   if (name == "grid.hpx") return at >= 64;  // codebook and indices, but not all of them
   return name == "sampler.bin" && (at >= 32 || at == 22);  // 22: one of two meanings of an angle
@@ -406,7 +426,7 @@ class StructureCheck {
 };
 
 TEST(ValidateCorpus, EveryFlippedByteIsFoundByItsHash) {
-  for (const MemoryFiles& files : {MaterialCorpus(), BrdfCorpus(true)}) {
+  for (const MemoryFiles& files : {MaterialCorpus(), BrdfCorpus(true), VaryingCorpus()}) {
     for (const auto& [name, bytes] : files.files) {
       if (name == "manifest.json" || name == "run.json") continue;
       const size_t stride = std::max<size_t>(1, bytes.size() / 25);
@@ -422,7 +442,7 @@ TEST(ValidateCorpus, EveryFlippedByteIsFoundByItsHash) {
 }
 
 TEST(ValidateCorpus, FlippedBytesOfStructureAreFoundWithoutHashes) {
-  for (const MemoryFiles& files : {MaterialCorpus(), BrdfCorpus(false)}) {
+  for (const MemoryFiles& files : {MaterialCorpus(), BrdfCorpus(false), VaryingCorpus()}) {
     const StructureCheck check(files);
     for (const ManifestPayload& payload : check.payloads()) {
       const Bytes& bytes = files.files.at(payload.name);
@@ -443,7 +463,7 @@ TEST(ValidateCorpus, FlippedBytesOfStructureAreFoundWithoutHashes) {
 }
 
 TEST(ValidateCorpus, EveryTruncationIsFound) {
-  for (const MemoryFiles& files : {MaterialCorpus(), BrdfCorpus(false)}) {
+  for (const MemoryFiles& files : {MaterialCorpus(), BrdfCorpus(false), VaryingCorpus()}) {
     const StructureCheck check(files);
     for (const ManifestPayload& payload : check.payloads()) {
       const Bytes& bytes = files.files.at(payload.name);
@@ -501,9 +521,7 @@ TEST(ValidateCorpus, ForgedPayloadsGetTheirOwnCodes) {
       {"shape", "decoder.weights", 3009, put32(64 + 64 * 0, 0x30303030)},
       {"reserved", "decoder.weights", 3010, put32(40, 1)},
   };
-  const MemoryFiles material = MaterialCorpus();
-  for (const Forgery& forgery : forgeries) {
-    MemoryFiles files = material;
+  const auto expect_code = [](MemoryFiles files, const Forgery& forgery) {
     Bytes& bytes = files.files[forgery.file];
     forgery.change(&bytes);
     FixCrc(forgery.file, &bytes);
@@ -511,7 +529,9 @@ TEST(ValidateCorpus, ForgedPayloadsGetTheirOwnCodes) {
     const auto numbers = test::NumbersOf(test::FindingsOf(files));
     EXPECT_NE(std::count(numbers.begin(), numbers.end(), forgery.number), 0)
         << forgery.file << " " << forgery.name << ": " << (numbers.empty() ? 0 : numbers.front());
-  }
+  };
+  const MemoryFiles material = MaterialCorpus();
+  for (const Forgery& forgery : forgeries) expect_code(material, forgery);
   const Forgery brdf_forgeries[] = {
       {"magic", "grid.hpx", 4001, put32(0, 1)},
       {"Nside 0", "grid.hpx", 4002, put16(28, 0)},
@@ -528,16 +548,44 @@ TEST(ValidateCorpus, ForgedPayloadsGetTheirOwnCodes) {
        [](Bytes* bytes) { std::fill(bytes->begin() + 36, bytes->end(), uint8_t{0}); }},
   };
   const MemoryFiles brdf = BrdfCorpus(false);
-  for (const Forgery& forgery : brdf_forgeries) {
-    MemoryFiles files = brdf;
-    Bytes& bytes = files.files[forgery.file];
-    forgery.change(&bytes);
-    FixCrc(forgery.file, &bytes);
-    FixHash(forgery.file, &files);
-    const auto numbers = test::NumbersOf(test::FindingsOf(files));
-    EXPECT_NE(std::count(numbers.begin(), numbers.end(), forgery.number), 0)
-        << forgery.file << " " << forgery.name << ": " << (numbers.empty() ? 0 : numbers.front());
+  for (const Forgery& forgery : brdf_forgeries) expect_code(brdf, forgery);
+  const Forgery halves_forgeries[] = {
+      {"magic", "features_0.dds", 2001, put32(0, 1)},
+      {"width 0", "features_0.dds", 2002, put32(16, 0)},
+      {"DXGI format", "features_0.dds", 2003, put32(128, 11)},
+      {"as blocks", "features_0.dds", 2005, put32(128, 95)},
+      {"longer", "features_0.dds", 2005, [](Bytes* bytes) { bytes->resize(bytes->size() + 8); }},
+      {"as linear size", "features_0.dds", 2007, put32(8, 0x000A1007)},
+      {"alpha", "features_1.dds", 2007, put16(148 + 8 + 6, 0)},
+      {"infinity", "features_0.dds", 2103, put16(148 + 2, 0x7C00)},
+      {"minus infinity", "features_1.dds", 2103, put16(148 + 8 * 9, 0xFC00)},
+      {"not a number, last texel", "features_1.dds", 2103,
+       [](Bytes* bytes) { (*bytes)[bytes->size() - 3] = 0x7E; }},
+  };
+  const MemoryFiles varying = VaryingCorpus();
+  for (const Forgery& forgery : halves_forgeries) expect_code(varying, forgery);
+  // What blocks must not be taken for.
+  ordered_json manifest = ManifestOf(varying);
+  manifest["features"][1]["format"] = "BC6H_UF16";
+  MemoryFiles other = varying;
+  SetManifest(manifest, &other);
+  EXPECT_EQ(test::NumbersOf(test::FindingsOf(other)), std::vector<int>{2006});
+}
+
+TEST(ValidateCorpus, NamesTheFirstTexelThatIsNotFiniteAndCountsTheOthers) {
+  MemoryFiles files = VaryingCorpus();
+  Bytes& bytes = files.files["features_0.dds"];
+  for (const size_t texel : {13 * 2 + 5, 13 * 9 + 1}) {  // (5, 2) of level 0, (1, 0) of level 1
+    bytes[148 + 8 * texel] = 1;
+    bytes[148 + 8 * texel + 1] = 0xFE;
   }
+  FixHash("features_0.dds", &files);
+  const std::vector<Finding> findings = test::FindingsOf(files);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].number, 2103);
+  EXPECT_EQ(findings[0].offset, 148u + 8 * (13 * 2 + 5));
+  EXPECT_EQ(findings[0].message,
+            "texel (5, 2) of level 0 is infinite or not a number, and 1 more");
 }
 
 TEST(ValidateCorpus, MissingAndForeignFilesAreFound) {
