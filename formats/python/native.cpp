@@ -11,6 +11,7 @@
 
 #include "formats/decoder/patina_brdf_decoder.h"
 #include "formats/decoder/patina_decoder.h"
+#include "formats/decoder/patina_svbrdf_decoder.h"
 
 namespace py = pybind11;
 
@@ -79,14 +80,19 @@ void CheckRows(const Floats& array, py::ssize_t columns, const char* name) {
   throw py::value_error(std::string(name) + ": an array of N rows of " + std::to_string(columns) + " numbers is needed");
 }
 
+// Rows of u, v, level of detail.
+void CheckPlaces(const Floats& places) {
+  CheckRows(places, 3, "places");
+  for (py::ssize_t i = 0; i < places.size(); ++i) {
+    if (!std::isfinite(places.data()[i])) throw py::value_error("places: row " + std::to_string(i / 3) + " is not finite");
+  }
+}
+
 // [n][channel] at rows of u, v, level of detail.
 Floats Sample(const patina::Decoder& decoder, const Floats& places, bool physical) {
-  CheckRows(places, 3, "places");
+  CheckPlaces(places);
   const py::ssize_t count = places.shape(0), channels = static_cast<py::ssize_t>(decoder.channels().size());
   const float* in = places.data();
-  for (py::ssize_t i = 0; i < 3 * count; ++i) {
-    if (!std::isfinite(in[i])) throw py::value_error("places: row " + std::to_string(i / 3) + " is not finite");
-  }
   Floats out({count, channels});
   float* data = out.mutable_data();
   const py::gil_scoped_release release;
@@ -118,6 +124,25 @@ Floats EvaluateBrdf(const patina::BrdfDecoder& decoder, const Floats& wi, const 
   float* data = out.mutable_data();
   const py::gil_scoped_release release;
   for (py::ssize_t i = 0; i < count; ++i) decoder.Evaluate(a + 3 * i, b + 3 * i, data + 3 * i);
+  return out;
+}
+
+// places: as of Sample.
+Floats EvaluateSvbrdf(const patina::SvbrdfDecoder& decoder, const Floats& wi, const Floats& wo, const Floats& places) {
+  CheckRows(wi, 3, "wi");
+  CheckRows(wo, 3, "wo");
+  CheckPlaces(places);
+  CheckSameLength(wi, wo);
+  CheckSameLength(wi, places);
+  const py::ssize_t count = wi.shape(0);
+  Floats out({count, py::ssize_t{3}});
+  const float *a = wi.data(), *b = wo.data(), *at = places.data();
+  float* data = out.mutable_data();
+  const py::gil_scoped_release release;
+  for (py::ssize_t i = 0; i < 3 * count; i += 3) {
+    const auto u = static_cast<double>(at[i]), v = static_cast<double>(at[i + 1]), lod = static_cast<double>(at[i + 2]);
+    decoder.Evaluate(a + i, b + i, u, v, lod, data + i);
+  }
   return out;
 }
 
@@ -155,6 +180,7 @@ Floats PdfOfBrdf(const patina::BrdfDecoder& decoder, const Floats& wi, const Flo
 PYBIND11_MODULE(_native, module) {
   using patina::BrdfDecoder;
   using patina::Decoder;
+  using patina::SvbrdfDecoder;
   py::class_<Decoder>(module, "Material")
       .def(py::init(&Load<Decoder>))
       .def_property_readonly("width", &Decoder::width)
@@ -171,4 +197,10 @@ PYBIND11_MODULE(_native, module) {
       .def("evaluate", &EvaluateBrdf)
       .def("sample", &SampleBrdf)
       .def("pdf", &PdfOfBrdf);
+  py::class_<SvbrdfDecoder>(module, "Svbrdf")
+      .def(py::init(&Load<SvbrdfDecoder>))
+      .def_property_readonly("width", &SvbrdfDecoder::width)
+      .def_property_readonly("height", &SvbrdfDecoder::height)
+      .def_property_readonly("levels", &SvbrdfDecoder::levels)
+      .def("evaluate", &EvaluateSvbrdf);
 }

@@ -380,7 +380,10 @@ void AddEval(CLI::App* app, CommandLine* line) {
       ->add_option("CONTAINER", o.container,
                    "A container, or the folder of an asset (its current container)")
       ->required();
-  command->add_option("--pairs", o.pairs, "Lines of wix,wiy,wiz,wox,woy,woz")
+  command
+      ->add_option("--pairs", o.pairs,
+                   "Lines of wix,wiy,wiz,wox,woy,woz; of a BRDF that varies over the surface "
+                   "followed by ,u,v or ,u,v,level")
       ->required()
       ->type_name("FILE.csv");
   command->add_option("-o,--out", o.out, "Write to this file, not to standard output")
@@ -389,7 +392,10 @@ void AddEval(CLI::App* app, CommandLine* line) {
   command->footer(
       "Directions are unit vectors, z along the normal, both pointing away from the surface. "
       "Printed is a line r,g,b for\n"
-      "each pair: f in 1/sr, linear Rec. 709, without the cosine; 0,0,0 below the horizon.\n"
+      "each pair: f in 1/sr, linear Rec. 709, without the cosine; 0,0,0 below the horizon. u and v "
+      "are texture\n"
+      "coordinates, v downwards; level is that of detail, in mips (0, the finest, where the column "
+      "is left out).\n"
       "Example:\n"
       "  patina eval baked/chrome --pairs pairs.csv --out values.csv");
   command->callback([line] { line->command = Command::kEval; });

@@ -63,6 +63,12 @@ class Package(unittest.TestCase):
         cls.root = cls.folder.name
         subprocess.run([PATINA, "sample", "--out", cls.root + "/wall", "--size", "64", "-q"], check=True)
         cls.material, = patina.bake(cls.root + "/wall", out=cls.root + "/baked", quality="preview", samples=200000)
+        subprocess.run([PATINA, "sample", "--kind", "btf", "--out", cls.root + "/cloth", "--size", "16", "--images", "9", "-q"], check=True)
+        with open(cls.root + "/cloth.json", "w", encoding="utf-8") as file:
+            # A model that is learned in a second.
+            json.dump({"version": 1, "kind": "svbrdf", "asset": "cloth", "file": "cloth/bumps.btf.json", "out": "baked",
+                       "quality": "preview", "model": {"nside": 4, "hidden": 32, "textures": 2}}, file)
+        cls.svbrdf, = patina.bake(cls.root + "/cloth.json", out=cls.root + "/baked")
         cls.brdf, = patina.bake(cls.root + "/wall/brdf/sparse.csv", out=cls.root + "/baked", quality="preview")
 
     @classmethod
@@ -98,15 +104,32 @@ class Package(unittest.TestCase):
         for name, values in coded.items():
             numpy.testing.assert_allclose(sampled[name].reshape(values.shape), values, atol=1e-5)
 
+    def evaluated(self, container, *columns):
+        """What the program says."""
+        pairs = self.root + "/pairs.csv"
+        numpy.savetxt(pairs, numpy.column_stack(columns), delimiter=",", fmt="%.9g")
+        text = subprocess.run([PATINA, "eval", container.path, "--pairs", pairs], check=True, capture_output=True, text=True).stdout
+        return numpy.array([[float(word) for word in line.split(",")] for line in text.splitlines()])
+
     def test_brdfs_agree_with_the_program(self):
         rng = numpy.random.default_rng(1)
         wi, wo = directions(rng, 50), directions(rng, 50)
         f = self.brdf.evaluate(wi, wo)
-        pairs = self.root + "/pairs.csv"
-        numpy.savetxt(pairs, numpy.column_stack([wi, wo]), delimiter=",", fmt="%.9g")
-        text = subprocess.run([PATINA, "eval", self.brdf.path, "--pairs", pairs], check=True, capture_output=True, text=True).stdout
-        rows = [[float(word) for word in line.split(",")] for line in text.splitlines() if line and (line[0].isdigit() or line[0] == "-")]
-        numpy.testing.assert_allclose(f, numpy.array(rows)[:, -3:], rtol=1e-4, atol=1e-6)
+        numpy.testing.assert_allclose(f, self.evaluated(self.brdf, wi, wo), rtol=1e-4, atol=1e-6)
+
+    def test_brdfs_that_vary_agree_with_the_program(self):
+        self.assertEqual((self.svbrdf.kind, self.svbrdf.size, self.svbrdf.levels), ("svbrdf", (16, 16), 5))
+        rng = numpy.random.default_rng(3)
+        wi, wo = directions(rng, 50), directions(rng, 50)
+        uv = rng.uniform(-2, 2, (50, 2)).astype(numpy.float32)
+        lod = rng.uniform(0, 4, 50).astype(numpy.float32)
+        f = self.svbrdf.evaluate(wi, wo, uv, lod)
+        self.assertEqual(f.shape, (50, 3))
+        numpy.testing.assert_allclose(f, self.evaluated(self.svbrdf, wi, wo, uv, lod), rtol=1e-4, atol=1e-6)
+        finest = self.svbrdf.evaluate(wi, wo, uv)
+        numpy.testing.assert_allclose(finest, self.evaluated(self.svbrdf, wi, wo, uv), rtol=1e-4, atol=1e-6)
+        numpy.testing.assert_array_equal(finest, self.svbrdf.evaluate(wi, wo, uv, lod=0))
+        self.assertFalse(numpy.array_equal(finest, f))
 
     def test_draws_directions_with_their_density(self):
         rng = numpy.random.default_rng(2)
@@ -137,6 +160,21 @@ class Package(unittest.TestCase):
             self.brdf.evaluate(numpy.zeros((4, 3)), numpy.zeros((5, 3)))
         with self.assertRaisesRegex(ValueError, "row 1 is not finite"):
             self.material.sample([[0, 0], [float("nan"), 0]])
+        one = numpy.float32([[0, 0, 1]])
+        with self.assertRaisesRegex(TypeError, "needs uv"):
+            self.svbrdf.evaluate(one, one)
+        with self.assertRaisesRegex(TypeError, "takes no uv"):
+            self.brdf.evaluate(one, one, [[0, 0]])
+        with self.assertRaisesRegex(ValueError, "as many rows"):
+            self.svbrdf.evaluate(one, one, [[0, 0], [1, 1]])
+        with self.assertRaisesRegex(ValueError, "rows of 2"):
+            self.svbrdf.evaluate(one, one, [0, 0])
+        with self.assertRaisesRegex(ValueError, "row 0 is not finite"):
+            self.svbrdf.evaluate(one, one, [[0, 0]], lod=float("inf"))
+        with self.assertRaisesRegex(TypeError, "evaluate"):
+            self.svbrdf.decode()
+        with self.assertRaisesRegex(TypeError, "draws no directions"):
+            self.svbrdf.sample_directions(one, one)
         with open(self.brdf.path + "/manifest.json", encoding="utf-8") as file:
             self.assertEqual(json.load(file), self.brdf.manifest)
 

@@ -20,8 +20,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   } else {
     FUZZ_CHECK(!job.error().message.empty() && job.error().code != ErrorCode::kInternal);
   }
-  const auto pairs = ParsePairs(text, "pairs.csv");
-  FUZZ_CHECK(pairs.has_value() || !pairs.error().message.empty());
+  for (const PairColumns columns : {PairColumns::kDirections, PairColumns::kPlaces}) {
+    const auto pairs = ParsePairs(text, columns, "pairs.csv");
+    FUZZ_CHECK(pairs.has_value() || !pairs.error().message.empty());
+  }
   return 0;
 }
 
@@ -33,8 +35,11 @@ std::vector<std::vector<uint8_t>> FuzzSeeds() {
           {"role": "roughness", "file": "g.png", "channels": "g", "invert": true}], "profile": "bcf-2k",
           "quality": "reference", "seed": 7, "threads": 2, "target_psnr_db": 36.5, "address": "clamp"})",
       R"({"version": 1, "kind": "brdf", "asset": "a", "file": "f.binary", "out": "o", "model": {"nside": 8}})",
-      "0,0,1,0.6,0,0.8\n# note\n0.6,0,0.8,0,0,1\n"};
+      "0,0,1,0.6,0,0.8\n# note\n0.6,0,0.8,0,0,1\n",
+      "wix,wiy,wiz,wox,woy,woz,u,v,level\n0,0,1,0.6,0,0.8,0.25,-3,1.5\n"};
   return SeedsOf(texts, [](std::string_view text) {
-    return ParseJob(text, "", "seed").has_value() || ParsePairs(text, "seed").has_value();
+    return ParseJob(text, "", "seed").has_value() ||
+           ParsePairs(text, PairColumns::kDirections, "seed").has_value() ||
+           ParsePairs(text, PairColumns::kPlaces, "seed").has_value();
   });
 }

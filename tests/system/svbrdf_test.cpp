@@ -8,6 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "formats/decoder/patina_svbrdf_decoder.h"
 #include "formats/schema_check.h"
@@ -112,6 +113,42 @@ TEST_F(BakedBtf, IsTheSameToTheByteForAnyThreadCountAndTarget) {
           << file << ", " << threads << " threads";
     }
   }
+}
+
+TEST_F(BakedBtf, EvaluatesAtPlacesAsTheDecoderDoes) {
+  SvbrdfDecoder decoder;
+  std::string problem;
+  ASSERT_EQ(SvbrdfDecoder::Load(Container(), &decoder, &problem), SvbrdfDecoder::LoadStatus::kOk)
+      << problem;
+  const std::string pairs = *folder_ / "places.csv";
+  std::ofstream(pairs) << "wix,wiy,wiz,wox,woy,woz,u,v,level\n"
+                          "0,0,1,0.6,0,0.8,0.25,0.5,0\n"
+                          "0,0,1,0.6,0,0.8,-1.3,7.5,1.5\n"
+                          "0.6,0,0.8,0,0.8,0.6,0.9,0.1,99\n"
+                          "0,0,1,0.6,0,-0.8,0.9,0.1,0\n";
+  const float up[3] = {0, 0, 1}, right[3] = {0.6f, 0, 0.8f}, down[3] = {0, 0.8f, 0.6f};
+  float expected[4][3] = {};
+  decoder.Evaluate(up, right, 0.25, 0.5, 0, expected[0]);
+  decoder.Evaluate(up, right, -1.3, 7.5, 1.5, expected[1]);
+  decoder.Evaluate(right, down, 0.9, 0.1, 4, expected[2]);
+  const Outcome outcome = Patina({"eval", Container(), "--pairs", pairs});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::istringstream lines(outcome.out);
+  for (const auto& rgb : expected) {
+    std::string line;
+    ASSERT_TRUE(std::getline(lines, line));
+    float read[3];
+    ASSERT_EQ(std::sscanf(line.c_str(), "%f,%f,%f", read, read + 1, read + 2), 3) << line;
+    for (int c = 0; c < 3; ++c) EXPECT_EQ(read[c], rgb[c]) << line;
+  }
+  EXPECT_FALSE(lines.peek() != EOF);
+  EXPECT_NE(expected[0][0], expected[1][0]);
+
+  std::ofstream(pairs) << "0,0,1,0.6,0,0.8\n";
+  const Outcome bare = Patina({"eval", Container(), "--pairs", pairs});
+  EXPECT_EQ(bare.exit_code, 3);
+  EXPECT_EQ(bare.out, "");
+  EXPECT_THAT(bare.err, AllOf(HasSubstr("places.csv: line 1"), HasSubstr("columns u and v")));
 }
 
 TEST_F(BakedBtf, DecodesAtAnyPlaceAndRefusesWhatIsDamaged) {

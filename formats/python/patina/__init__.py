@@ -7,6 +7,7 @@
     values = wall.sample(uv, lod=1.5)          # the same keys, values at N texture coordinates
     chrome, = patina.bake("chrome.binary", out="baked")
     f = chrome.evaluate(wi, wo)                # (N, 3), 1/sr, without the cosine
+    f = cloth.evaluate(wi, wo, uv, lod=1)      # of one that varies over the surface
 
 Physical values: linear colours of the container's working space, unit normals of tangent space (OpenGL), the rest as it is.
 """
@@ -90,7 +91,7 @@ class Container:
         with open(os.path.join(path, "manifest.json"), encoding="utf-8") as file:
             self.manifest = json.load(file)
         self.kind = self.manifest.get("kind", "material")
-        decoders = {"material": _native.Material, "brdf": _native.Brdf}
+        decoders = {"material": _native.Material, "brdf": _native.Brdf, "svbrdf": _native.Svbrdf}
         if self.kind not in decoders:
             raise ValueError(f"{path}: kind {self.kind} is not decoded here yet; formats/FORMATS.md names the header that does")
         self._decoder = decoders[self.kind](path)
@@ -102,20 +103,29 @@ class Container:
     def asset(self):
         return self.manifest["asset"]
 
-    def _of(self, kind, what):
-        if (self.kind == "brdf") != (kind == "brdf"):
+    def _of(self, kinds, what):
+        if self.kind not in kinds:
             raise TypeError(f"{self.asset} is of kind {self.kind}: {what}")
         return self._decoder
 
     @property
     def size(self):
         """Width and height of mip 0, in texels."""
-        decoder = self._of("material", "it has no texels")
+        decoder = self._of(("material", "svbrdf"), "it has no texels")
         return decoder.width, decoder.height
 
     @property
     def levels(self):
-        return self._of("material", "it has no mips").levels
+        return self._of(("material", "svbrdf"), "it has no mips").levels
+
+    @staticmethod
+    def _places(uv, lod):
+        """Rows of u, v and level of detail."""
+        uv = numpy.asarray(uv, dtype=numpy.float32)
+        if uv.ndim != 2 or uv.shape[1] != 2:
+            raise ValueError("uv: an array of N rows of 2 numbers is needed")
+        lods = numpy.broadcast_to(numpy.asarray(lod, dtype=numpy.float32), uv.shape[:1])
+        return numpy.column_stack([uv, lods])
 
     def _maps(self, planes, coded):
         """Channels, first axis, to a map each, last axis; z of normals is added to physical values."""
@@ -131,25 +141,31 @@ class Container:
 
     def decode(self, level=0, coded=False):
         """All maps of a mip: {name: float32 array (H, W) or (H, W, channels)}."""
-        return self._maps(self._of("material", "use evaluate()").decode_mip(level, not coded), coded)
+        return self._maps(self._of(("material",), "use evaluate()").decode_mip(level, not coded), coded)
 
     def sample(self, uv, lod=0.0, coded=False):
         """All maps at texture coordinates (N, 2), v downwards, and mips `lod` (a number, or N of them)."""
-        decoder = self._of("material", "use evaluate()")
-        uv = numpy.asarray(uv, dtype=numpy.float32)
-        if uv.ndim != 2 or uv.shape[1] != 2:
-            raise ValueError("uv: an array of N rows of 2 numbers is needed")
-        lods = numpy.broadcast_to(numpy.asarray(lod, dtype=numpy.float32), uv.shape[:1])
-        return self._maps(decoder.sample(numpy.column_stack([uv, lods]), not coded).T, coded)
+        decoder = self._of(("material",), "use evaluate()")
+        return self._maps(decoder.sample(self._places(uv, lod), not coded).T, coded)
 
-    def evaluate(self, wi, wo):
-        """f(wi, wo) of a BRDF, (N, 3), 1/sr, without the cosine. Directions: unit vectors (N, 3), z along the normal."""
-        return self._of("brdf", "use decode() or sample()").evaluate(wi, wo)
+    def evaluate(self, wi, wo, uv=None, lod=0.0):
+        """f(wi, wo) of a BRDF, (N, 3), 1/sr, without the cosine. Directions: unit vectors (N, 3), z along the normal.
+
+        One that varies over the surface (kind svbrdf) has it at places: uv and lod, as of sample().
+        """
+        decoder = self._of(("brdf", "svbrdf"), "use decode() or sample()")
+        if self.kind == "svbrdf":
+            if uv is None:
+                raise TypeError(f"{self.asset} varies over the surface: evaluate() needs uv, N rows of texture coordinates")
+            return decoder.evaluate(wi, wo, self._places(uv, lod))
+        if uv is not None:
+            raise TypeError(f"{self.asset} is the same everywhere: evaluate() takes no uv")
+        return decoder.evaluate(wi, wo)
 
     def sample_directions(self, wi, u):
         """Draws wo for wi by numbers u (N, 3) in [0, 1): wo (N, 3), and its density per solid angle (N), 0 of lost samples."""
-        return self._of("brdf", "it has no directions").sample(wi, u)
+        return self._of(("brdf",), "it draws no directions").sample(wi, u)
 
     def pdf(self, wi, wo):
         """The density of sample_directions(), (N)."""
-        return self._of("brdf", "it has no directions").pdf(wi, wo)
+        return self._of(("brdf",), "it draws no directions").pdf(wi, wo)
