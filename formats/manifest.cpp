@@ -613,8 +613,8 @@ Result<std::string> ToJson(const Manifest& manifest) {
     json["channels"] = ChannelsToJson(manifest.channels);
     json["maps"] = MapsToJson(manifest.maps);
     if (manifest.lod_range) json["lod_range"] = *manifest.lod_range;
-    if (manifest.scene) json["scene"] = SceneLookToJson(*manifest.scene);
   }
+  if (manifest.scene) json["scene"] = SceneLookToJson(*manifest.scene);
   json["color"] = ColorToJson(manifest);
   if (manifest.brdf) {
     json["quality"] = BrdfQualityToJson(manifest.brdf->quality);
@@ -681,9 +681,11 @@ Result<Manifest> ParseManifest(std::string_view text) {
       mips.resize(2, -1);  // CheckManifest refuses what is not there
       manifest.lod_range = {mips[0], mips[1]};
     }
-    if (const JsonView scene = json.Optional("scene")) manifest.scene = SceneLookFromJson(scene);
     manifest.quality = ReadQuality(json.Field("quality"));
     manifest.training = ReadTraining(json.Field("training"));
+  }
+  if (manifest.kind != "brdf") {
+    if (const JsonView scene = json.Optional("scene")) manifest.scene = SceneLookFromJson(scene);
   }
   manifest.effects = EffectsFromJson(json);
   json.Field("warnings").ForEach(kMaxEntries, [&](const JsonView& warning) {

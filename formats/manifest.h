@@ -296,7 +296,7 @@ struct Manifest {
   std::vector<ManifestMap> maps;           // [material]
   // [material] The mips of the source that are stored; absent: all.
   std::optional<std::array<int, 2>> lod_range;
-  std::optional<SceneLook> scene;            // [material] if it comes from a scene
+  std::optional<SceneLook> scene;            // [material], "svbrdf": if it comes from a scene
   std::optional<ManifestBrdf> brdf;          // of kinds "brdf" and "svbrdf", and only there
   std::string working_space = "lin_rec709";  // of physical colour values; or "acescg"
   std::optional<ManifestColorConfig> color_config;  // [material] absent before 0.2

@@ -470,7 +470,6 @@ Status CheckMaterial(const Manifest& manifest) {
   PATINA_TRY(CheckModel(manifest));
   PATINA_TRY(CheckChannels(manifest));
   PATINA_TRY(CheckMaps(manifest));
-  if (manifest.scene) PATINA_TRY(CheckSceneLook(*manifest.scene));
   PATINA_TRY(CheckQuality(manifest));
   return CheckTraining(manifest.training);
 }
@@ -501,6 +500,7 @@ Status CheckManifest(const Manifest& manifest) {
         !status && config.source != "builtin")
       return status;
   }
+  if (manifest.scene) PATINA_TRY(CheckSceneLook(*manifest.scene));
   return manifest.kind == "material" ? CheckMaterial(manifest) : CheckBrdf(manifest);
 }
 

@@ -474,16 +474,6 @@ class MaterialReader {
     if (any_clamp && !material_.clamp) {
       WarnOnce("Its textures are clamped here and repeated there; the container repeats.");
     }
-    std::vector<std::pair<int, UvTransform>> coordinates;
-    for (const SceneBinding& binding : material_.look.bindings) {
-      const auto here = std::pair(binding.tex_coord, binding.transform);
-      if (std::find(coordinates.begin(), coordinates.end(), here) == coordinates.end())
-        coordinates.push_back(here);
-    }
-    if (coordinates.size() > 1) {
-      WarnOnce("Its textures have " + std::to_string(coordinates.size()) +
-               " different coordinates or transforms; decode once for each, as `bindings` say.");
-    }
   }
 
   const GltfFile& gltf_;

@@ -8,10 +8,10 @@
 #include <set>
 
 #include "formats/base/file_io.h"
-#include "formats/layered/layered_file.h"
 #include "formats/scene/scene_name.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/result_text.h"
+#include "pipeline/jobs/as_reflectance.h"
 #include "pipeline/jobs/brdf_group.h"
 #include "pipeline/jobs/event_log.h"
 #include "pipeline/jobs/job_plan.h"
@@ -41,7 +41,7 @@ std::string MapOptions(const JobOverrides& given, const Job& job) {
   };
   add(given.profile.has_value(), "--profile");
   const bool set = job.kind == JobKind::kSvbrdf && job.file.empty();
-  const bool maps = set || (job.kind == JobKind::kSvbrdf && layered::IsLayersFileName(job.file));
+  const bool maps = ReadsColorMaps(job);
   add(given.address.has_value() && !set, "--address");
   add(given.normal_convention.has_value() && !set, "--normal-convention");
   add(given.target_psnr_db.has_value(), "--target-psnr");
@@ -69,9 +69,8 @@ void ApplyToMaps(const JobOverrides& overrides, Job* job) {
     if (overrides.address)
       job->address = *overrides.address == "clamp" ? AddressMode::kClamp : AddressMode::kWrap;
     Override(overrides.normal_convention, &job->normal_convention);
-  } else if (!layered::IsLayersFileName(job->file)) {
-    return;
   }
+  if (!ReadsColorMaps(*job)) return;
   Override(overrides.color_space, &job->color_space);
   Override(overrides.ocio, &job->ocio);
 }
@@ -167,27 +166,13 @@ bool WriteSceneManifests(const std::vector<PlannedJob>& plan, const std::vector<
 void RefuseWithoutNeuralTexture(std::vector<PlannedJob>* plan) {
   for (PlannedJob& planned : *plan) {
     if (!planned.job || planned.job->kind == JobKind::kSvbrdf) continue;
-    const bool set = planned.job->kind == JobKind::kMaterial && planned.job->scene.empty();
+    const bool material = planned.job->kind == JobKind::kMaterial;
     planned.job = Fail(
         ErrorCode::kInvalidArgument,
         std::string("--texture-format is of the neural texture of a spatially varying BRDF, and "
                     "this is a ") +
-            (planned.job->kind == JobKind::kMaterial ? "material" : "BRDF that does not vary") +
-            "; leave it out" + (set ? ", or add --as svbrdf" : ""));
-  }
-}
-
-// Of --as svbrdf. What is reflectance already stays as it is.
-void BakeSetsAsReflectance(std::vector<PlannedJob>* plan) {
-  for (PlannedJob& planned : *plan) {
-    if (!planned.job || planned.job->kind != JobKind::kMaterial) continue;
-    if (planned.job->scene.empty()) {
-      planned.job->kind = JobKind::kSvbrdf;
-    } else {
-      planned.job = Fail(ErrorCode::kInvalidArgument,
-                         "--as svbrdf takes texture sets, and this is a material of a scene, whose "
-                         "factors and transforms it would leave out; give the folder of the maps");
-    }
+            (material ? "material; leave it out, or add --as svbrdf"
+                      : "BRDF that does not vary; leave it out"));
   }
 }
 
@@ -228,7 +213,9 @@ std::vector<PlannedJob> Plan(const BakeOptions& options, Verbosity verbosity) {
     }
   }
   KeepChosenMaterials(options.materials, &plan);
-  if (options.as_svbrdf) BakeSetsAsReflectance(&plan);
+  for (PlannedJob& planned : plan) {
+    if (planned.job && options.as == "svbrdf") BakeAsReflectance(&*planned.job);
+  }
   if (options.job.texture_format) RefuseWithoutNeuralTexture(&plan);
   std::set<std::string> taken;
   std::map<std::string, std::string> described;  // where a scene's manifest comes, and whose it is

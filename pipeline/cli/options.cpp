@@ -61,8 +61,7 @@ constexpr const char* kBakeFooter =
     "  patina bake cloth/cloth.btf.json --out baked    a spatially varying BRDF\n"
     "  patina bake lacquer/lacquer.layers.json --out baked            likewise, where layers have "
     "maps\n"
-    "  patina bake wall --out baked --as svbrdf                       reflectance of a texture "
-    "set\n"
+    "  patina bake wall scene.glb --out baked --as svbrdf             reflectance of texture sets\n"
     "  patina bake wall --out baked --maps wall.maps.json --normal-convention directx\n"
     "  patina bake wall --out baked --target-psnr 32                  the smallest that reaches "
     "it\n"
@@ -120,6 +119,16 @@ CLI::Option* AddOverride(CLI::App* command, const std::string& name, std::option
       ->take_last();
 }
 
+void AddAs(CLI::App* command, const std::string& otherwise, std::string* as) {
+  command
+      ->add_option("--as", *as,
+                   "[maps] What texture sets and materials of scenes become: a material (default" +
+                       otherwise +
+                       "), which has their channels; or svbrdf, the reflectance that follows from "
+                       "them, filtered as such")
+      ->check(CLI::IsMember({"material", "svbrdf"}));
+}
+
 void AddBake(CLI::App* app, CommandLine* line) {
   CLI::App* command =
       app->add_subcommand("bake", "Bake texture sets, scenes and measured BRDFs into containers");
@@ -138,12 +147,7 @@ void AddBake(CLI::App* app, CommandLine* line) {
       "(default with a target or a size): the smallest that reaches the target, or the largest "
       "that fits")
       ->check(CLI::IsMember({"auto", "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}));
-  command
-      ->add_option_function<std::string>(
-          "--as", [&o](const std::string& what) { o.as_svbrdf = what == "svbrdf"; },
-          "[maps] What texture sets become: a material (default), which has their channels; or "
-          "svbrdf, the reflectance that follows from them, filtered as such")
-      ->check(CLI::IsMember({"material", "svbrdf"}));
+  AddAs(command, "", &o.as);
   AddOverride(command, "--quality", &o.job.quality, "How long to train (default standard)")
       ->check(CLI::IsMember({"preview", "standard", "reference"}));
   AddOverride(command, "--target-psnr", &o.job.target_psnr_db,

@@ -48,7 +48,7 @@ struct BakeOptions {
   std::string map_list;                // --maps FILE.json, or empty
   int share = 1;                       // BRDFs on one codebook
   std::vector<std::string> materials;  // of scenes: only these; empty: all
-  bool as_svbrdf = false;              // texture sets as reflectance
+  std::string as;                      // what texture sets become; empty: "material"
   JobOverrides job;
 };
 

@@ -166,7 +166,7 @@ std::string BrdfText(const Manifest& m) {
                    static_cast<unsigned long long>(brdf.cells),
                    static_cast<unsigned long long>(brdf.invalid_cells));
   }
-  text += EffectsText(m);
+  text += SceneText(m) + EffectsText(m);
   for (const std::string& warning : m.warnings) text += "Warning: " + warning + "\n";
   return text;
 }

@@ -315,11 +315,16 @@ void ReadMapFields(ObjectReader* reader, std::vector<std::string>* problems, Job
   if (address == "clamp") job->address = AddressMode::kClamp;
 }
 
-void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+// Maps, or the material of a scene that has them.
+void ReadSourceFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
   ReadMapFields(reader, problems, job);
   reader->Text("scene", false, 4096, &job->scene);
   reader->Text("material", false, 255, &job->scene_material);
   ReadSceneFields(reader, job);
+}
+
+void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
+  ReadSourceFields(reader, problems, job);
   std::string profile;
   reader->Choice("profile", {"auto", "bcf-0.5k", "bcf-1k", "bcf-2k", "bcf-2k++"}, &profile);
   reader->Number("target_psnr_db", 100, &job->target_psnr_db);
@@ -340,15 +345,20 @@ void ReadMaterialFields(ObjectReader* reader, std::vector<std::string>* problems
   AssignEnum(working_space, ParseWorkingSpace, &job->working_space);
 }
 
-// A file, or a texture set in its place.
+// A file, or a texture set or a material of a scene in its place.
 void ReadSvbrdfInput(ObjectReader* reader, std::vector<std::string>* problems, Job* job) {
   const bool file = reader->Find("file") != nullptr;
-  const bool set = reader->Find("folder") != nullptr || reader->Find("maps") != nullptr;
-  if (!file && !set)
-    reader->Complain("file", "is missing: give it, or \"folder\" or \"maps\" of a texture set");
-  if (!file) return ReadMapFields(reader, problems, job);
-  if (set) reader->Complain("file", "says what is read: leave out \"folder\" and \"maps\"");
-  for (const char* key : {"set", "address", "normal_convention"})
+  const bool set = reader->Find("folder") != nullptr || reader->Find("maps") != nullptr ||
+                   reader->Find("scene") != nullptr;
+  if (!file && !set) {
+    reader->Complain("file",
+                     "is missing: give it, or \"folder\", \"maps\" or \"scene\" of textures");
+    return ReadMapFields(reader, problems, job);
+  }
+  if (!file) return ReadSourceFields(reader, problems, job);
+  if (set)
+    reader->Complain("file", "says what is read: leave out \"folder\", \"maps\" and \"scene\"");
+  for (const char* key : {"set", "material", "address", "normal_convention"})
     reader->Refuse(key, "belongs to a texture set, and this job has a \"file\"; leave it out");
   if (layered::IsLayersFileName(job->file)) {
     reader->Text("color_space", false, kMaxColorSpaceName, &job->color_space);
@@ -369,13 +379,14 @@ void ReadBrdfFields(ObjectReader* reader, std::vector<std::string>* problems, Jo
                               std::string(JobKindName(job->kind)) + "\"");
     }
   };
-  refuse({"scene", "material", "effects", "constant_tolerance", "lod_range", "profile",
-          "target_psnr_db", "target_bpp", "size_budget_bytes", "time_budget_s", "samples",
-          "min_psnr_db", "repair_nonfinite", "toksvig", "working_space"});
+  refuse({"effects", "constant_tolerance", "lod_range", "profile", "target_psnr_db", "target_bpp",
+          "size_budget_bytes", "time_budget_s", "samples", "min_psnr_db", "repair_nonfinite",
+          "toksvig", "working_space"});
   if (varies) {
     ReadSvbrdfInput(reader, problems, job);
   } else {
-    refuse({"folder", "set", "maps", "address", "normal_convention", "color_space", "ocio"});
+    refuse({"folder", "set", "maps", "scene", "material", "address", "normal_convention",
+            "color_space", "ocio"});
   }
   if (!varies && job->model.textures)
     reader->Complain("model", "\"textures\" belongs to jobs of kind \"svbrdf\"; leave it out");

@@ -54,7 +54,7 @@ struct JobModel {
 enum class JobKind { kMaterial, kBrdf, kSvbrdf };  // "material", "brdf", "svbrdf"
 
 // Fields marked [material] or [brdf] belong to jobs of that kind only; those of BRDFs to spatially
-// varying ones, too, which may have folder, set, maps and how to read them in place of a file.
+// varying ones, too, which may have folder, set, maps or scene and how to read them, not a file.
 struct Job {
   JobKind kind = JobKind::kMaterial;
   std::string asset;

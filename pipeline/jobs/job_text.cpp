@@ -47,6 +47,11 @@ void MapsToJson(const Job& job, nlohmann::ordered_json* json) {
   }
 }
 
+void SceneToJson(const Job& job, nlohmann::ordered_json* json) {
+  if (!job.scene.empty()) (*json)["scene"] = job.scene;
+  if (!job.scene_material.empty()) (*json)["material"] = job.scene_material;
+}
+
 // How maps are read, where it is not the default.
 void ReadingToJson(const Job& job, nlohmann::ordered_json* json) {
   const Job defaults;
@@ -62,6 +67,7 @@ std::string BrdfJobToJson(const Job& job, nlohmann::ordered_json json) {
   const Job defaults;
   if (!job.file.empty()) json["file"] = job.file;
   MapsToJson(job, &json);
+  SceneToJson(job, &json);
   json["out"] = job.out;
   ReadingToJson(job, &json);
   const JobModel& model = job.model;
@@ -157,8 +163,7 @@ std::string JobToJson(const Job& job) {
   json["asset"] = job.asset;
   if (job.kind != JobKind::kMaterial) return BrdfJobToJson(job, std::move(json));
   MapsToJson(job, &json);
-  if (!job.scene.empty()) json["scene"] = job.scene;
-  if (!job.scene_material.empty()) json["material"] = job.scene_material;
+  SceneToJson(job, &json);
   json["out"] = job.out;
   if (job.choose_profile) {
     json["profile"] = "auto";

@@ -68,6 +68,7 @@ Json MaterialJson(const SceneMaterial& material, const std::string& out,
   const Manifest& manifest = container->manifest;
   json["revision"] = fs::path(container->directory).filename().string();
   json["container"] = material.asset + "/" + json["revision"].get<std::string>();
+  json["kind"] = manifest.kind;
   json["fingerprint"] = manifest.fingerprint;
   json["scene"] = SceneLookToJson(*manifest.scene);
   json["constants"] = ConstantsToJson(manifest.channels);

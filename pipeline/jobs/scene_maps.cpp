@@ -72,6 +72,7 @@ class MapMaker {
     result_.warnings = scene_.warnings;
     result_.warnings.insert(result_.warnings.end(), material_.warnings.begin(),
                             material_.warnings.end());
+    if (job_.kind == JobKind::kMaterial) WarnOfCoordinates();
     if (result_.set.maps.empty() && result_.constants.empty()) {
       return Fail(ErrorCode::kInvalidArgument,
                   Where() + "nothing is left of it to bake; use one of its maps");
@@ -81,6 +82,19 @@ class MapMaker {
 
  private:
   std::string Where() const { return job_.scene + ": " + material_.pointer + ": "; }
+
+  void WarnOfCoordinates() {
+    std::vector<std::pair<int, UvTransform>> coordinates;
+    for (const SceneBinding& binding : material_.look.bindings) {
+      const auto here = std::pair(binding.tex_coord, binding.transform);
+      if (std::find(coordinates.begin(), coordinates.end(), here) == coordinates.end())
+        coordinates.push_back(here);
+    }
+    if (coordinates.size() < 2) return;
+    result_.warnings.push_back(
+        "Its textures have " + std::to_string(coordinates.size()) +
+        " different coordinates or transforms; decode once for each, as `bindings` say.");
+  }
 
   Status FindRole(const std::string& name, const MapRole** role) const {
     *role = FindMapRole(name);

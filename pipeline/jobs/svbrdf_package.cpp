@@ -119,6 +119,7 @@ Manifest DescribeSvbrdf(const Job& job, const SvbrdfSource& source,
   }
   if (source.images == 0) manifest.effects = EffectsOf(source, shape.model.grid);
   DescribeBrdfModel(shape.model, texture.features(), &model);
+  manifest.scene = source.scene;
   manifest.brdf = std::move(model);
   return manifest;
 }

@@ -1,6 +1,7 @@
 #include "pipeline/jobs/svbrdf_run.h"
 
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 
 #include "formats/base/file_io.h"
@@ -34,10 +35,13 @@ class SvbrdfRun : public StagedRun {
 
   Status Ingest() {
     PATINA_TRY(ChooseSimdTarget());
+    // Images may lie inside a scene's file.
+    if (!job_.scene.empty()) PATINA_TRY(OpenStaging());
+    const std::string scratch = staging_ ? staging_->directory() + "/source" : "";
     reading_input_ = true;
     {
       ThreadPool pool(job_.threads);
-      PATINA_ASSIGN(source_, ReadSvbrdfSource(job_, pool, cancel_, sink_));
+      PATINA_ASSIGN(source_, ReadSvbrdfSource(job_, scratch, pool, cancel_, sink_));
     }
     result_.fingerprint = source_.fingerprint;
     observer_.OnNote("found", source_.found);
@@ -45,7 +49,7 @@ class SvbrdfRun : public StagedRun {
     reading_input_ = false;
     unchanged_ = FoundUnchanged();
     if (unchanged_) return {};
-    PATINA_TRY(OpenStaging());
+    if (!staging_) PATINA_TRY(OpenStaging());
     const svbrdf::VaryingSource& texels = *source_.texels;
     shape_ = SvbrdfModelOfJob(job_, texels.width(), texels.height(), texels.address(),
                               texels.isotropic());
@@ -73,6 +77,9 @@ class SvbrdfRun : public StagedRun {
     PATINA_ASSIGN(texels_, texels.Draw(drawing, *pool_));
     PATINA_TRY(CheckUnchanged(source_, *pool_, cancel_));
     reading_input_ = false;
+    std::error_code error;
+    if (!scratch.empty()) std::filesystem::remove_all(scratch, error);
+    if (error) return FailErrno(error.value(), "cannot remove", scratch);
     cost_ = texels_.cost;
     if (source_.simulated) {
       char text[128];

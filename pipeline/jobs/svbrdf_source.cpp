@@ -9,8 +9,8 @@
 #include "formats/base/sha256.h"
 #include "formats/layered/layered_file.h"
 #include "formats/layered/varying_stack.h"
-#include "pipeline/jobs/job_sets.h"
 #include "pipeline/jobs/package.h"
+#include "pipeline/jobs/pbr_maps.h"
 #include "pipeline/jobs/svbrdf_job.h"
 #include "pipeline/layered/simulated_source.h"
 #include "pipeline/material/source_maps.h"
@@ -155,13 +155,15 @@ Result<SvbrdfSource> ReadStack(const Job& job, ThreadPool& pool, const CancelTok
   return source;
 }
 
-Result<SvbrdfSource> ReadTextureSet(const Job& job, ThreadPool& pool, const CancelToken& cancel,
+Result<SvbrdfSource> ReadTextureSet(const Job& job, const std::string& scratch_folder,
+                                    ThreadPool& pool, const CancelToken& cancel,
                                     ProgressSink& progress) {
   SvbrdfSource source;
   source.format = kTextureSetFormat;
-  PATINA_ASSIGN(const MapSet set, MapsOfJob(job));
+  PATINA_ASSIGN(PbrMaps input, ReadPbrMaps(job, scratch_folder));
+  const MapSet& set = input.set;
   ReferenceOptions options;
-  options.address = job.address;
+  options.address = input.address;
   options.normal_convention =
       ParseNormalConvention(job.normal_convention).value_or(NormalConvention::kAuto);
   options.cancel = &cancel;
@@ -169,15 +171,19 @@ Result<SvbrdfSource> ReadTextureSet(const Job& job, ThreadPool& pool, const Canc
   if (!config) return Fail(config.error(), "/ocio");
   options.color.config = *config;
   options.color.space = job.color_space;
-  std::string how;
+  std::string how = input.scene_text;
+  std::vector<std::string> names;
   for (const MapSource& map : set.maps) {
     // A file may hold several maps.
-    if (std::find(source.paths.begin(), source.paths.end(), map.path) == source.paths.end())
-      source.paths.push_back(map.path);
+    if (std::find(source.paths.begin(), source.paths.end(), map.path) != source.paths.end())
+      continue;
+    source.paths.push_back(map.path);
+    names.push_back(input.scene ? map.file : NameOf(map.path));
   }
   PATINA_ASSIGN(source.digests, HashFiles(source.paths, pool, cancel));
   PATINA_ASSIGN(const SourceMaps maps, LoadSourceMaps(set, options, pool, progress));
-  PATINA_ASSIGN(const auto model, svbrdf::PbrModel::Make(maps, set.name, job.address, pool));
+  PATINA_ASSIGN(const auto model,
+                svbrdf::PbrModel::Make(maps, set.name, input.address, pool, input.settings));
   bool converted = false;
   std::string used;
   for (const std::string& role : model->used()) used += (used.empty() ? "" : ", ") + role;
@@ -196,10 +202,12 @@ Result<SvbrdfSource> ReadTextureSet(const Job& job, ThreadPool& pool, const Canc
   }
   source.images_sha256 = HashOfDigests(source.digests, 0);
   for (size_t i = 0; i < source.paths.size(); ++i)
-    AddFile(source.paths[i], source.digests[i], &source);
+    source.files.push_back({ManifestPath(names[i]), source.digests[i]});
   source.effects = model->used();
   source.left_out = model->left_out();
-  source.warnings = model->warnings();
+  source.warnings = std::move(input.warnings);
+  source.warnings.insert(source.warnings.end(), model->warnings().begin(), model->warnings().end());
+  source.scene = std::move(input.scene);
   source.found = set.name + ": " + used + " of " + SizeText(*model);
   Sha256 hash;
   hash.Update(Begin(job) + how + ColorText(*config, converted));
@@ -210,9 +218,10 @@ Result<SvbrdfSource> ReadTextureSet(const Job& job, ThreadPool& pool, const Canc
 
 }  // namespace
 
-Result<SvbrdfSource> ReadSvbrdfSource(const Job& job, ThreadPool& pool, const CancelToken& cancel,
+Result<SvbrdfSource> ReadSvbrdfSource(const Job& job, const std::string& scratch_folder,
+                                      ThreadPool& pool, const CancelToken& cancel,
                                       ProgressSink& progress) {
-  if (job.file.empty()) return ReadTextureSet(job, pool, cancel, progress);
+  if (job.file.empty()) return ReadTextureSet(job, scratch_folder, pool, cancel, progress);
   return layered::IsLayersFileName(job.file) ? ReadStack(job, pool, cancel)
                                              : ReadImages(job, pool, cancel);
 }

@@ -1,5 +1,5 @@
 // What a job of kind "svbrdf" learns from: a set of measured images, a layered material with maps,
-// or a texture set.
+// a texture set, or a material of a scene.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@
 
 namespace patina {
 
-// What SvbrdfSource::format and manifests call a texture set.
+// What SvbrdfSource::format and manifests call a texture set, one of a scene too.
 inline constexpr const char* kTextureSetFormat = "texture_set";
 
 // A source that was read, and the fingerprint of what is made from it.
@@ -35,12 +35,15 @@ struct SvbrdfSource {
   std::optional<layered::Stack> simulated;  // with the means of its maps; else f is exact
   std::vector<std::string> effects, left_out;  // of what f follows from; empty of images
   std::vector<std::string> warnings;
+  std::optional<SceneLook> scene;  // of a material of one; its bindings are all of one transform
 };
 
 // Reads the source and hashes its files; pixels of measured images are looked at by
-// VaryingSource::Draw alone. Errors: those of ReadImageSet, Sha256OfFile, ReadVaryingStack and
-// StackModel::Load, MapsOfJob, LoadSourceMaps and PbrModel::Make; kCancelled.
-Result<SvbrdfSource> ReadSvbrdfSource(const Job& job, ThreadPool& pool, const CancelToken& cancel,
+// VaryingSource::Draw alone. Images inside a scene's file are written to `scratch_folder`, which is
+// to stay until after CheckUnchanged. Errors: those of ReadImageSet, Sha256OfFile, ReadVaryingStack
+// and StackModel::Load, MapsOfJob, ReadPbrMaps, LoadSourceMaps and PbrModel::Make; kCancelled.
+Result<SvbrdfSource> ReadSvbrdfSource(const Job& job, const std::string& scratch_folder,
+                                      ThreadPool& pool, const CancelToken& cancel,
                                       ProgressSink& progress);
 
 // Whether the files still are what was read: who copies a set meanwhile must not get a container

@@ -18,10 +18,29 @@ float Visibility(float cosine, float alpha2) {
   return 1 / (cosine + std::sqrt(alpha2 + (1 - alpha2) * cosine * cosine));
 }
 
+// The member of one number that a role is; null for others.
+float PbrSurface::*NumberOf(const std::string& role) {
+  return role == "roughness"   ? &PbrSurface::roughness
+         : role == "metalness" ? &PbrSurface::metalness
+         : role == "specular"  ? &PbrSurface::specular
+                               : nullptr;
+}
+
+// The factor of a role's component.
+float FactorOf(const PbrSettings& settings, const std::string& role, size_t component) {
+  for (const SceneValue& factor : settings.factors) {
+    if (factor.map == role)
+      return static_cast<float>(factor.value[std::min(component, factor.value.size() - 1)]);
+  }
+  return 1;
+}
+
+float Share(float value) { return std::clamp(value, 0.0f, 1.0f); }
+
 }  // namespace
 
 void EvaluatePbr(const PbrSurface& surface, const brdf::Direction& wi, const brdf::Direction& wo,
-                 float rgb[3]) {
+                 float rgb[3], float dielectric_f0) {
   const float roughness = std::max(surface.roughness, kLeastPbrRoughness);
   const float alpha = roughness * roughness, alpha2 = alpha * alpha;
   brdf::Direction h = {wi.x + wo.x, wi.y + wo.y, wi.z + wo.z};
@@ -36,7 +55,7 @@ void EvaluatePbr(const PbrSurface& surface, const brdf::Direction& wi, const brd
   const float schlick = away * away * away * away * away;
   const float m = surface.metalness;
   for (int c = 0; c < 3; ++c) {
-    const float f0 = (1 - m) * 0.04f * surface.specular + m * surface.base[c];
+    const float f0 = (1 - m) * dielectric_f0 * surface.specular + m * surface.base[c];
     const float f90 = (1 - m) * surface.specular + m;
     const float fresnel = f0 + (f90 - f0) * schlick;
     rgb[c] = (1 - fresnel) * (1 - m) * surface.base[c] / kPi + fresnel * lobe;
@@ -45,27 +64,26 @@ void EvaluatePbr(const PbrSurface& surface, const brdf::Direction& wi, const brd
 
 Result<std::shared_ptr<const PbrModel>> PbrModel::Make(const SourceMaps& maps,
                                                        const std::string& name, AddressMode address,
-                                                       ThreadPool& pool) {
+                                                       ThreadPool& pool,
+                                                       const PbrSettings& settings) {
   std::shared_ptr<PbrModel> model(new PbrModel);
   model->width_ = maps.width;
   model->height_ = maps.height;
   model->address_ = address;
+  model->dielectric_f0_ = settings.dielectric_f0;
   const auto width = static_cast<size_t>(maps.width);
   model->texels_.resize(width * static_cast<size_t>(maps.height));
-  bool has_albedo = false;
+  model->left_out_ = settings.left_out;
+  for (const ConstantMap& constant : settings.constants) model->SetConstant(constant);
   for (const MapPlan& plan : maps.plans) {
     const char* role = plan.role->name;
     const LoadedFile& file = maps.files[static_cast<size_t>(plan.file)];
     const auto is = [role](const char* what) { return std::strcmp(role, what) == 0; };
-    float PbrSurface::*number = is("roughness")   ? &PbrSurface::roughness
-                                : is("metalness") ? &PbrSurface::metalness
-                                : is("specular")  ? &PbrSurface::specular
-                                                  : nullptr;
+    float PbrSurface::*number = NumberOf(role);
     if (!is("albedo") && !is("normal") && number == nullptr) {
       model->left_out_.push_back(role);
       continue;
     }
-    has_albedo = has_albedo || is("albedo");
     model->has_normals_ = model->has_normals_ || (is("normal") && !plan.constant_file);
     model->used_.push_back(role);
     std::atomic<uint64_t> clamped{0};
@@ -77,8 +95,13 @@ Result<std::shared_ptr<const PbrModel>> PbrModel::Make(const SourceMaps& maps,
       Texel* out = model->texels_.data() + static_cast<size_t>(y) * width;
       if (is("normal")) {
         for (size_t x = 0; x < width; ++x) {
-          out[x].nx = planes[0][x];
-          out[x].ny = -planes[1][x];  // rows of the frame run down
+          const float nx = settings.normal_scale * planes[0][x];
+          const float ny = settings.normal_scale * planes[1][x];
+          const float length = settings.normal_scale == 1
+                                   ? 1
+                                   : std::sqrt(nx * nx + ny * ny + planes[2][x] * planes[2][x]);
+          out[x].nx = length > 0 ? nx / length : 0;
+          out[x].ny = length > 0 ? -ny / length : 0;  // rows of the frame run down
         }
         return;
       }
@@ -86,17 +109,20 @@ Result<std::shared_ptr<const PbrModel>> PbrModel::Make(const SourceMaps& maps,
         for (float* plane : planes) LinearizeMapRow(plan, plane, maps.width);
       }
       uint64_t beyond = 0;
-      const auto share = [&beyond](float value) {
-        const float within = std::clamp(value, 0.0f, 1.0f);
+      const float factors[3] = {FactorOf(settings, role, 0), FactorOf(settings, role, 1),
+                                FactorOf(settings, role, 2)};
+      const auto share = [&](float value, size_t component) {
+        value *= factors[component];
+        const float within = Share(value);
         beyond += std::abs(value - within) > 1e-4f ? 1 : 0;
         return within;
       };
       for (size_t x = 0; x < width; ++x) {
         if (number != nullptr) {
-          out[x].surface.*number = share(planes[0][x]);
+          out[x].surface.*number = share(planes[0][x], 0);
           continue;
         }
-        for (size_t c = 0; c < 3; ++c) out[x].surface.base[c] = share(planes[c][x]);
+        for (size_t c = 0; c < 3; ++c) out[x].surface.base[c] = share(planes[c][x], c);
       }
       clamped.fetch_add(beyond, std::memory_order_relaxed);
     });
@@ -106,7 +132,12 @@ Result<std::shared_ptr<const PbrModel>> PbrModel::Make(const SourceMaps& maps,
                                  " samples lie beyond 0 to 1 and are clamped.");
     }
   }
-  if (!has_albedo) {
+  const auto roles = [](const std::string& a, const std::string& b) {
+    return MapRoleIndex(a) < MapRoleIndex(b);
+  };
+  std::sort(model->used_.begin(), model->used_.end(), roles);
+  std::sort(model->left_out_.begin(), model->left_out_.end(), roles);
+  if (std::find(model->used_.begin(), model->used_.end(), "albedo") == model->used_.end()) {
     return Fail(ErrorCode::kInvalidArgument,
                 name +
                     ": there is no base colour, from which reflectance follows; add a map such as "
@@ -121,6 +152,20 @@ Result<std::shared_ptr<const PbrModel>> PbrModel::Make(const SourceMaps& maps,
   return std::shared_ptr<const PbrModel>(std::move(model));
 }
 
+void PbrModel::SetConstant(const ConstantMap& constant) {
+  float PbrSurface::*number = NumberOf(constant.role);
+  const bool albedo = constant.role == "albedo";
+  if (number == nullptr && !albedo) {
+    left_out_.push_back(constant.role);
+    return;
+  }
+  used_.push_back(constant.role);
+  for (Texel& texel : texels_) {
+    if (number != nullptr) texel.surface.*number = Share(constant.value[0]);
+    for (size_t c = 0; albedo && c < 3; ++c) texel.surface.base[c] = Share(constant.value[c]);
+  }
+}
+
 void PbrModel::AddDraws(size_t texel, const brdf::Direction& wi, const brdf::Direction& wo,
                         int draws, Rng*, double sum[3], double squares[3]) const {
   const Texel& at = texels_[texel];
@@ -131,7 +176,7 @@ void PbrModel::AddDraws(size_t texel, const brdf::Direction& wi, const brdf::Dir
   }
   if (frame.factor == 0) return;
   float rgb[3];
-  EvaluatePbr(at.surface, frame.wi, frame.wo, rgb);
+  EvaluatePbr(at.surface, frame.wi, frame.wo, rgb, dielectric_f0_);
   for (int c = 0; c < 3; ++c) {
     const double f = static_cast<double>(frame.factor * rgb[c]);
     sum[c] += draws * f;

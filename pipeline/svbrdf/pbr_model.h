@@ -28,19 +28,32 @@ struct PbrSurface {
   float specular = 1;  // factor of the 0.04, KHR_materials_specular's strength
 };
 
+// Of what no metal is, at normal incidence: index of refraction 1.5.
+inline constexpr float kDielectricF0 = 0.04f;
+
 // f of a surface, 1/sr, without the cosine; both directions above its horizon.
 void EvaluatePbr(const PbrSurface& surface, const brdf::Direction& wi, const brdf::Direction& wo,
-                 float rgb[3]);
+                 float rgb[3], float dielectric_f0 = kDielectricF0);
+
+// What a scene says of a material besides its textures.
+struct PbrSettings {
+  std::vector<ConstantMap> constants;  // of maps without a texture
+  std::vector<SceneValue> factors;     // of maps with one: one or three numbers
+  float normal_scale = 1;              // of x and y, before the normal is made a unit vector
+  float dielectric_f0 = kDielectricF0;
+  std::vector<std::string> left_out;  // roles that were found, and are not among the maps
+};
 
 class PbrModel : public TexelModel {
  public:
   // Takes albedo (which must be there), normal, roughness (else 1), metalness (else 0) and specular
   // (else 1) from maps that LoadSourceMaps has read in the working space lin_rec709; what else
-  // there is plays no part, which the warnings say. Values beyond [0, 1] are clamped, with a
-  // warning. Errors: kInvalidArgument (no albedo).
+  // there is plays no part, which the warnings say. Values beyond [0, 1], after the factor, are
+  // clamped, with a warning. Errors: kInvalidArgument (no albedo).
   static Result<std::shared_ptr<const PbrModel>> Make(const SourceMaps& maps,
                                                       const std::string& name, AddressMode address,
-                                                      ThreadPool& pool);
+                                                      ThreadPool& pool,
+                                                      const PbrSettings& settings = {});
 
   bool has_normals() const { return has_normals_; }
   // Roles that f follows from, and others that were found, in the order of MapRoles().
@@ -65,10 +78,12 @@ class PbrModel : public TexelModel {
   };
 
   PbrModel() = default;
+  void SetConstant(const ConstantMap& constant);
 
   int width_ = 0, height_ = 0;
   AddressMode address_ = AddressMode::kWrap;
   bool has_normals_ = false;
+  float dielectric_f0_ = kDielectricF0;
   std::vector<Texel> texels_;
   std::vector<std::string> used_, left_out_, warnings_;
 };

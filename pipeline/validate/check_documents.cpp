@@ -176,6 +176,8 @@ void CheckSceneManifest(const std::string& path, const std::string& label, Findi
     }
     const Manifest& manifest = container->manifest;
     CompareMember(material, "asset", manifest.asset, pointer, label, findings);
+    if (material.contains("kind") || manifest.kind != "material")
+      CompareMember(material, "kind", manifest.kind, pointer, label, findings);
     CompareMember(material, "fingerprint", manifest.fingerprint, pointer, label, findings);
     CompareMember(material, "constants", ConstantsToJson(manifest.channels), pointer, label,
                   findings);

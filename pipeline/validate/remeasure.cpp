@@ -104,7 +104,12 @@ void RemeasureSvbrdf(const Container& container, const Job& job, ThreadPool& poo
   again_job.seed = container.manifest.seed;
   again_job.quality = ParseQuality(container.manifest.quality_setting).value_or(job.quality);
   again_job.address = model.images->address == "wrap" ? AddressMode::kWrap : AddressMode::kClamp;
-  const auto source = ReadSvbrdfSource(again_job, pool, cancel, progress);
+  if (!job.scene.empty()) {
+    return refuse(
+        {ErrorCode::kUnsupported,
+         job.scene + ": materials of scenes are not measured again; leave out --against"});
+  }
+  const auto source = ReadSvbrdfSource(again_job, "", pool, cancel, progress);
   if (!source) return refuse(source.error());
   if (model.images->sha256 != source->images_sha256) {
     findings->Add(1401, file, {"/source/images", {}},

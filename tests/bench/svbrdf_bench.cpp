@@ -276,7 +276,7 @@ class Runner {
       Must(WriteSampleSet(set_folder_, arguments_.size, arguments_.seed, pool_));
       job.folder = set_folder_;
     }
-    source_ = Must(ReadSvbrdfSource(job, pool_, CancelToken(), NoProgress()));
+    source_ = Must(ReadSvbrdfSource(job, "", pool_, CancelToken(), NoProgress()));
     const svbrdf::VaryingSource& texels = *source_.texels;
     shape_ = svbrdf::DefaultSvbrdfShape(texels.width(), texels.height(), texels.address(),
                                         texels.isotropic());

@@ -457,5 +457,91 @@ TEST_F(BakedMaps, ATextureSetBecomesReflectance) {
   EXPECT_THAT(bare.err, HasSubstr("no base colour"));
 }
 
+// A material of a scene: packed channels, factors and one transform; what else there is, is refused
+// by name.
+TEST_F(BakedMaps, AMaterialOfASceneBecomesReflectance) {
+  const std::string in = folder_ / "in";
+  ASSERT_EQ(Patina({"sample", "--kind", "material", "--out", in, "--size", "16"}).exit_code, 0);
+  const Json turned = {{"KHR_texture_transform", {{"scale", {2, 2}}}}};
+  const Json base = {{"index", 0}, {"extensions", turned}};
+  const auto coat = [&base](const char* extension, const char* factor) {
+    return Json{{"name", extension},
+                {"pbrMetallicRoughness", {{"baseColorTexture", base}}},
+                {"extensions", {{extension, {{factor, 1}}}}}};
+  };
+  Json gltf = {{"asset", {{"version", "2.0"}}},
+               {"images",
+                {{{"uri", "mosaic_floor_basecolor.png"}}, {{"uri", "mosaic_floor_normal_gl.png"}}}},
+               {"textures", {{{"source", 0}}, {{"source", 1}}}}};
+  gltf["materials"] =
+      Json::array({{{"name", "floor"},
+                    {"alphaMode", "MASK"},
+                    {"emissiveFactor", {1, 1, 1}},
+                    {"emissiveTexture", {{"index", 0}}},
+                    {"normalTexture", {{"index", 1}, {"scale", 0.5}, {"extensions", turned}}},
+                    {"extensions", {{"KHR_materials_ior", {{"ior", 1.8}}}}},
+                    {"pbrMetallicRoughness",
+                     {{"baseColorTexture", base},
+                      {"baseColorFactor", {0.5, 1, 1, 1}},
+                      {"metallicRoughnessTexture", base},
+                      {"metallicFactor", 0.25}}}},
+                   {{"name", "plain"}},
+                   {{"name", "torn"},
+                    {"normalTexture", {{"index", 1}}},
+                    {"pbrMetallicRoughness", {{"baseColorTexture", base}}}},
+                   coat("KHR_materials_clearcoat", "clearcoatFactor"),
+                   coat("KHR_materials_transmission", "transmissionFactor"),
+                   coat("KHR_materials_unlit", "nothing")});
+  std::ofstream(in + "/hall.gltf") << gltf.dump();
+  const std::string job =
+      WriteJobOf(folder_ / "job.json",
+                 {{"asset", "hall_floor"}, {"scene", "in/hall.gltf"}, {"material", "floor"}});
+  const Outcome baked = Patina({"bake", job});
+  ASSERT_EQ(baked.exit_code, 0) << baked.err;
+  EXPECT_THAT(baked.err, HasSubstr("no part of the reflectance: emissive, opacity"));
+  const std::string container = folder_ / "out/hall_floor/current";
+  const Json manifest = Json::parse(ReadAll(container + "/manifest.json"));
+  EXPECT_TRUE(CheckAgainstSchema("manifest", manifest));
+  EXPECT_EQ(manifest["kind"], "svbrdf");
+  EXPECT_EQ(manifest["source"]["format"], "texture_set");
+  EXPECT_EQ(manifest["source"]["files"].size(), 2u);
+  const Json& look = manifest["scene"];
+  EXPECT_EQ(look["material"], "floor");
+  EXPECT_EQ(look["alpha_mode"], "mask");
+  EXPECT_TRUE(look["factors"].empty() && look["parameters"].empty()) << look;
+  ASSERT_EQ(look["bindings"].size(), 3u) << look;
+  for (const Json& binding : look["bindings"])
+    EXPECT_EQ(binding["transform"]["scale"], Json({2.0, 2.0}));
+  EXPECT_FALSE(fs::exists(container + "/source"));
+  // The scene says where it is, and is right.
+  const Json scene = Json::parse(ReadAll(folder_ / "out/hall.scene.json"));
+  EXPECT_EQ(scene["materials"][0]["kind"], "svbrdf");
+  EXPECT_EQ(scene["materials"][0]["scene"], look);
+  const Outcome valid = Patina({"validate", folder_ / "out", "--fail-on", "warning"});
+  EXPECT_EQ(valid.exit_code, 0) << valid.out << valid.err;
+  EXPECT_THAT(Patina({"info", container}).out, HasSubstr("hall.gltf, material 0"));
+
+  // Numbers that f follows from are part of what is baked.
+  const std::string fingerprint = manifest["fingerprint"];
+  gltf["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.5, 1, 0.5, 1};
+  std::ofstream(in + "/hall.gltf") << gltf.dump();
+  ASSERT_EQ(Patina({"bake", job}).exit_code, 0);
+  EXPECT_NE(Json::parse(ReadAll(container + "/manifest.json"))["fingerprint"], fingerprint);
+
+  const Outcome refused = Patina(
+      {"bake", in + "/hall.gltf", "--as", "svbrdf", "--material", "plain", "--material", "torn",
+       "--material", "KHR_materials_clearcoat", "--material", "KHR_materials_transmission",
+       "--material", "KHR_materials_unlit", "--out", folder_ / "refused"});
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("/materials/1: it has no texture"),
+                    HasSubstr("/materials/2: pbrMetallicRoughness.baseColorTexture and "
+                              "normalTexture have different coordinates"),
+                    HasSubstr("/materials/3: its clearcoat (KHR_materials_clearcoat)"),
+                    HasSubstr("/materials/4: its transmission (KHR_materials_transmission)"),
+                    HasSubstr("/materials/5: it is unlit (KHR_materials_unlit)")));
+  EXPECT_FALSE(fs::exists(folder_ / "refused/hall_plain/current"));
+}
+
 }  // namespace
 }  // namespace patina

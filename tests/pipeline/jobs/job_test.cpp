@@ -8,6 +8,7 @@
 
 #include "formats/base/file_io.h"
 #include "formats/schema_check.h"
+#include "pipeline/jobs/as_reflectance.h"
 #include "pipeline/jobs/brdf_job.h"
 #include "pipeline/jobs/svbrdf_job.h"
 
@@ -299,6 +300,44 @@ TEST(ReadMapListFile, ReadsAnArrayOfMaps) {
   ASSERT_TRUE(WriteFileDurably(path, std::string_view(R"({"maps":[]})")));
   EXPECT_FALSE(ReadMapListFile(path));
   std::filesystem::remove(path);
+}
+
+TEST(ReadJob, TakesAMaterialOfASceneAsReflectance) {
+  auto job = ParseJob(R"({"version": 1, "kind": "svbrdf", "asset": "seat", "out": "o",
+                          "scene": "car.glb", "material": "seat", "address": "clamp"})",
+                      "in", "job.json");
+  ASSERT_TRUE(job) << job.error().message;
+  EXPECT_EQ(job->scene, "in/car.glb");
+  EXPECT_EQ(job->scene_material, "seat");
+  EXPECT_TRUE(job->address_given);
+  const auto again = ParseJob(JobToJson(*job), "", "job.json");
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(JobToJson(*again), JobToJson(*job));
+  EXPECT_EQ(CanonicalJob(*again), CanonicalJob(*job));
+  for (const char* fields : {R"("scene": "a.glb")", R"("material": "m", "folder": "f")",
+                             R"("scene": "a.glb", "material": "m", "folder": "f")",
+                             R"("scene": "a.glb", "material": "m", "file": "a.btf.json")"}) {
+    EXPECT_FALSE(ParseJob(R"({"version": 1, "kind": "svbrdf", "asset": "a", "out": "o", )" +
+                              std::string(fields) + "}",
+                          "", "job.json"))
+        << fields;
+  }
+}
+
+TEST(BakeAsReflectance, KeepsNothingThatTheKindDoesNotHave) {
+  auto job = ParseJob(R"({"version": 1, "kind": "material", "asset": "a", "out": "o",
+                          "scene": "a.glb", "material": "m", "effects": {"unused": false},
+                          "working_space": "acescg", "profile": "bcf-2k"})",
+                      "", "job.json");
+  ASSERT_TRUE(job) << job.error().message;
+  BakeAsReflectance(&*job);
+  EXPECT_EQ(job->kind, JobKind::kSvbrdf);
+  EXPECT_TRUE(job->effects.unused);
+  EXPECT_EQ(job->working_space, WorkingSpace::kLinearRec709);
+  EXPECT_TRUE(ParseJob(JobToJson(*job), "", "job.json"));
+  job->kind = JobKind::kBrdf;
+  BakeAsReflectance(&*job);
+  EXPECT_EQ(job->kind, JobKind::kBrdf);
 }
 
 // The parser and the published schema must agree, or a file that an editor calls valid would be

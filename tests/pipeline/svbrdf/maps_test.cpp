@@ -1,5 +1,6 @@
 // Models whose numbers are maps: footprints, the metallic-roughness model, stacks, and what samples
 // of them are.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -146,14 +147,58 @@ TEST(TiltedFrame, IsBoundedAtBothHorizons) {
   EXPECT_TRUE(std::isfinite(along.wi.x) && std::isfinite(along.factor));
 }
 
-std::shared_ptr<const PbrModel> PbrOf(const std::string& folder, ThreadPool& pool) {
+std::shared_ptr<const PbrModel> PbrOf(const std::string& folder, ThreadPool& pool,
+                                      const PbrSettings& settings = {}) {
   const auto sets = FindMaps(folder);
   EXPECT_TRUE(sets) << sets.error().message;
   const auto maps = LoadSourceMaps((*sets)[0], {}, pool, NoProgress());
   EXPECT_TRUE(maps) << maps.error().message;
-  const auto model = PbrModel::Make(*maps, "wall", AddressMode::kWrap, pool);
+  const auto model = PbrModel::Make(*maps, "wall", AddressMode::kWrap, pool, settings);
   EXPECT_TRUE(model) << model.error().message;
   return model ? *model : nullptr;
+}
+
+TEST(PbrModel, TakesTheNumbersOfAScene) {
+  test::TemporaryDirectory folder;
+  std::vector<float> albedo, normal;
+  for (int i = 0; i < 16; ++i) {
+    albedo.insert(albedo.end(), {0.5f, 0.25f, i == 0 ? 0.75f : 0.125f});
+    normal.insert(normal.end(), {0.5f + 0.5f * 0.6f, 0.5f, i == 0 ? 1.0f : 0.5f + 0.5f * 0.8f});
+  }
+  WriteMap(folder / "wall_basecolor.exr", 4, 4, albedo);
+  WriteMap(folder / "wall_normal.exr", 4, 4, normal);
+  WriteMap(folder / "wall_roughness.exr", 4, 4,
+           {0.75f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f, 0.25f,
+            0.25f, 0.25f, 0.25f, 0.25f});
+  PbrSettings settings;
+  settings.constants = {{"metalness", {0.25f}}, {"specular", {0.5f}}};
+  settings.factors = {{"albedo", {0.5, 1, 2}}, {"roughness", {2}}};
+  settings.normal_scale = 0.5f;
+  settings.dielectric_f0 = 0.08f;
+  settings.left_out = {"ao"};
+  ThreadPool pool(2);
+  const auto model = PbrOf(folder.path(), pool, settings);
+  ASSERT_NE(model, nullptr);
+  EXPECT_EQ(model->used(),
+            (std::vector<std::string>{"albedo", "normal", "roughness", "metalness", "specular"}));
+  EXPECT_EQ(model->left_out(), std::vector<std::string>{"ao"});
+  // Of the first texel blue and roughness are beyond 1.
+  EXPECT_THAT(model->warnings(), testing::Contains(testing::HasSubstr("basecolor.exr: 1 samples")));
+  EXPECT_THAT(model->warnings(), testing::Contains(testing::HasSubstr("roughness.exr: 1 samples")));
+  const PbrSurface surface{{0.25f, 0.25f, 0.25f}, 0.5f, 0.25f, 0.5f};
+  const float length = std::sqrt(0.3f * 0.3f + 0.8f * 0.8f);
+  const auto wi = Towards(40, 30), wo = Towards(20, 200);
+  const TiltedFrame frame = TiltTo({0.3f / length, 0, 0.8f / length}, wi, wo);
+  float f[3];
+  EvaluatePbr(surface, frame.wi, frame.wo, f, 0.08f);
+  double sum[3] = {}, squares[3] = {};
+  model->AddDraws(5, wi, wo, 1, nullptr, sum, squares);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(sum[c], frame.factor * f[c], 1e-4 * f[c]);
+  // Ours is the strength of highlights that no metal has, and nothing else.
+  float glossier[3], same[3];
+  EvaluatePbr({{0, 0, 0}, 0.5f, 0, 1}, Towards(0, 0), Towards(0, 0), same);
+  EvaluatePbr({{0, 0, 0}, 0.5f, 0, 1}, Towards(0, 0), Towards(0, 0), glossier, 0.08f);
+  EXPECT_NEAR(glossier[0], 2 * same[0], 1e-5f);
 }
 
 TEST(PbrModel, OfConstantsIsTheClosedForm) {
