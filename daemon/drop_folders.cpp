@@ -12,9 +12,8 @@
 
 #include "daemon/base/clock.h"
 #include "daemon/watch/watcher.h"
-#include "pipeline/image/map_groups.h"
-#include "pipeline/jobs/brdf_files.h"
-#include "pipeline/jobs/scene_job.h"
+#include "pipeline/jobs/as_reflectance.h"
+#include "pipeline/jobs/drop_jobs.h"
 
 namespace patina::daemon {
 namespace {
@@ -37,7 +36,10 @@ class WatchedFolders : public DropFolders, public AssetSource {
   Status Open(const Config& config) {
     for (const WatchConfig& watch : config.watch) {
       WatchOptions options;
-      options.root = watch.path;
+      // Without links, as the paths of assets are.
+      std::error_code ignored;
+      const std::string root = std::filesystem::weakly_canonical(watch.path, ignored).string();
+      options.root = ignored ? watch.path : root;
       options.exclude = {config.out, config.state_dir, WorkFolderOf(config)};
       options.exclude.insert(options.exclude.end(), config.output_roots.begin(),
                              config.output_roots.end());
@@ -47,14 +49,14 @@ class WatchedFolders : public DropFolders, public AssetSource {
       options.poll_ms = watch.poll_ms;
       options.rescan_s = watch.rescan_s;
       WatchHandlers handlers;
-      handlers.on_ready = [this, root = watch.path](const ReadyAsset& asset) {
-        return Offer(root, asset);
+      handlers.on_ready = [this, root = options.root, watch](const ReadyAsset& asset) {
+        return Offer(root, watch.as_svbrdf, asset);
       };
       handlers.on_gone = [this](const ReadyAsset& asset) { WithdrawAll(asset); };
-      handlers.on_scanned = [this, root = watch.path] { WithdrawMissing(root); };
+      handlers.on_scanned = [this, root = options.root] { WithdrawMissing(root); };
       PATINA_ASSIGN(std::unique_ptr<Watcher> watcher, Watcher::Start(options, std::move(handlers)));
       const std::lock_guard lock(mutex_);
-      watchers_.push_back(std::move(watcher));
+      watchers_.push_back({std::move(watcher), watch.as_svbrdf});
     }
     service_.AttachSource(this);
     return {};
@@ -65,7 +67,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
   WatchHealth Health() const override {
     const std::shared_lock lock(mutex_);
     WatchHealth health;
-    for (const auto& watcher : watchers_) {
+    for (const auto& [watcher, as_svbrdf] : watchers_) {
       const WatchStatus status = watcher->status();
       WatchedRoot root;
       root.path = status.root;
@@ -73,6 +75,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
       root.mode_reason = status.mode_reason;
       root.folders = status.folders;
       root.assets = status.assets;
+      root.as_svbrdf = as_svbrdf;
       health.roots.push_back(std::move(root));
       health.events += static_cast<int64_t>(status.events);
       health.overflows += static_cast<int64_t>(status.overflows);
@@ -89,7 +92,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
   std::vector<PendingAsset> Pending() const override {
     const std::shared_lock lock(mutex_);
     std::vector<PendingAsset> pending;
-    for (const auto& watcher : watchers_) {
+    for (const auto& [watcher, as_svbrdf] : watchers_) {
       for (const WatchedAsset& asset : watcher->assets()) {
         if (asset.state != AssetState::kReady)
           pending.push_back({asset.name, asset.path, asset.reason, 0});
@@ -102,112 +105,32 @@ class WatchedFolders : public DropFolders, public AssetSource {
 
   void RequestRescan() override {
     const std::shared_lock lock(mutex_);
-    for (const auto& watcher : watchers_) watcher->RequestRescan();
+    for (const auto& watched : watchers_) watched.watcher->RequestRescan();
   }
 
  private:
-  // One offer for a file or a folder with one material; one for each material of a folder that
-  // holds several, named after folder and set.
-  static std::vector<AssetOffer> OffersOf(const std::string& root, const ReadyAsset& asset) {
-    AssetOffer offer;
-    offer.job.asset = asset.name;
-    offer.signature = asset.token;
-    offer.failed_folder = asset.path == root ? root : ParentOf(asset.path);
-    if (asset.is_file) {
-      offer.job = JobOfBrdfFile(asset.name, asset.path);
-      return {offer};
-    }
+  struct Watched {
+    std::unique_ptr<Watcher> watcher;
+    bool as_svbrdf = false;
+  };
+
+  static std::vector<AssetOffer> OffersOf(const std::string& root, bool as_svbrdf,
+                                          const ReadyAsset& asset) {
     std::vector<AssetOffer> offers;
-    const std::vector<std::string> lists = FindImageSets(asset.path);
-    for (const std::string& list : lists) {
-      const std::string name = BrdfAssetName(list);
-      AssetOffer of_list = offer;
-      of_list.job = JobOfBrdfFile(
-          lists.size() == 1 ? asset.name : AssetNameFromPath(asset.name + "_" + name), list);
-      offers.push_back(std::move(of_list));
+    for (Job& job : DropJobs(root, asset.path, asset.name, asset.is_file)) {
+      AssetOffer offer;
+      offer.job = std::move(job);
+      if (as_svbrdf) BakeAsReflectance(&offer.job);
+      offer.signature = asset.token;
+      offer.failed_folder = asset.path == root ? root : ParentOf(asset.path);
+      offers.push_back(std::move(offer));
     }
-    // Its images are no maps.
-    if (!offers.empty()) return offers;
-    std::set<std::string> claimed;
-    OfferScenes(root, asset.path, offer, &claimed, &offers);
-    OfferStacks(root, asset, offer, &claimed, &offers);
-    offer.job.folder = asset.path;
-    if (!offers.empty() || !claimed.empty()) {
-      auto unclaimed = FindSetNames(asset.path, claimed);
-      if (!unclaimed) return offers;  // images that are no sets are the scene's
-      OfferSets(asset, *unclaimed, offer, &offers);
-      return offers;
-    }
-    const auto sets = FindSetNames(asset.path);
-    // What is wrong with a folder the job says, for all to read.
-    if (!sets || sets->size() < 2) return {offer};
-    OfferSets(asset, *sets, offer, &offers);
     return offers;
   }
 
-  // The materials of the scenes of a folder; and the files that scenes of it, or of folders above
-  // it, refer to. Named after folder, scene and material. Of a scene that cannot be read an offer
-  // whose run will say why.
-  static void OfferScenes(const std::string& root, const std::string& folder,
-                          const AssetOffer& pattern, std::set<std::string>* claimed,
-                          std::vector<AssetOffer>* offers) {
-    for (std::string above = folder;; above = ParentOf(above)) {
-      for (const std::string& path : FindSceneFiles(above)) {
-        const auto scene = ReadScene(path);
-        if (scene) {
-          for (std::string& file : FilesOfScene(*scene)) claimed->insert(std::move(file));
-        }
-        if (above != folder) continue;
-        AssetOffer offer = pattern;
-        offer.job.scene = path;
-        if (!scene) {
-          offer.job.asset = AssetNameFromPath(pattern.job.asset + "_scene");
-          offer.job.scene_material = "#0";
-          offers->push_back(std::move(offer));
-          continue;
-        }
-        for (const SceneMaterial& material : scene->materials) {
-          offer.job.asset = AssetNameFromPath(pattern.job.asset + "_" + material.asset);
-          offer.job.scene_material = SceneMaterialKey(*scene, material);
-          offers->push_back(offer);
-        }
-      }
-      if (above == root || above.size() <= root.size()) return;
-    }
-  }
-
-  // The layered materials with maps of a folder, named as other files are: after the way to them.
-  static void OfferStacks(const std::string& root, const ReadyAsset& asset,
-                          const AssetOffer& pattern, std::set<std::string>* claimed,
-                          std::vector<AssetOffer>* offers) {
-    for (const std::string& stack : FindMappedStacks(asset.path)) {
-      for (std::string& map : MapsOfStack(stack)) claimed->insert(std::move(map));
-      AssetOffer offer = pattern;
-      offer.job = JobOfBrdfFile(asset.path == root
-                                    ? BrdfAssetName(stack)
-                                    : AssetNameFromPath(asset.name + "_" + BrdfAssetName(stack)),
-                                stack);
-      offers->push_back(std::move(offer));
-    }
-  }
-
-  // Each set of a folder, named after folder and set.
-  static void OfferSets(const ReadyAsset& asset, const std::vector<std::string>& sets,
-                        AssetOffer offer, std::vector<AssetOffer>* all) {
-    const std::string folder = std::filesystem::path(asset.path).filename().string();
-    std::vector<AssetOffer>& offers = *all;
-    for (const std::string& set : sets) {
-      const bool prefixed = set.rfind(folder + "_", 0) == 0;
-      const std::string suffix = prefixed ? set.substr(folder.size()) : "_" + set;
-      offer.job.set = set;
-      offer.job.asset = AssetNameFromPath(asset.name + suffix);
-      offers.push_back(offer);
-    }
-  }
-
-  Status Offer(const std::string& root, const ReadyAsset& asset) {
+  Status Offer(const std::string& root, bool as_svbrdf, const ReadyAsset& asset) {
     std::set<std::string> names;
-    for (const AssetOffer& offer : OffersOf(root, asset)) {
+    for (const AssetOffer& offer : OffersOf(root, as_svbrdf, asset)) {
       const std::string& name = offer.job.asset;
       names.insert(name);
       auto outcome = service_.OfferAsset(offer);
@@ -271,7 +194,7 @@ class WatchedFolders : public DropFolders, public AssetSource {
   // Shared by those who ask: a list of assets that waits for a disk must not keep back a look at
   // the health.
   mutable std::shared_mutex mutex_;
-  std::vector<std::unique_ptr<Watcher>> watchers_;
+  std::vector<Watched> watchers_;
   std::mutex offered_mutex_;
   std::map<std::string, std::set<std::string>> offered_;  // path -> names of assets
 };

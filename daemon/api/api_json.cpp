@@ -104,7 +104,8 @@ Json WatchToJson(const WatchHealth& health) {
                              {"mode", root.mode},
                              {"mode_reason", root.mode_reason},
                              {"folders", root.folders},
-                             {"assets", root.assets}});
+                             {"assets", root.assets},
+                             {"as", root.as_svbrdf ? "svbrdf" : "material"}});
   }
   json["events"] = health.events;
   json["overflows"] = health.overflows;

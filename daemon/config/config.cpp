@@ -159,6 +159,7 @@ class Loader {
         Take(item, "settle_ms", &watch.settle_ms);
         Take(item, "poll_ms", &watch.poll_ms);
         Take(item, "rescan_s", &watch.rescan_s);
+        watch.as_svbrdf = item.value("as", Json()) == "svbrdf";
         if (!watch.path.empty()) c.watch.push_back(watch);
       }
     }
@@ -502,7 +503,8 @@ std::string ConfigToJson(const Config& c) {
                              {"mode", WatchModeName(watch.mode)},
                              {"settle_ms", watch.settle_ms},
                              {"poll_ms", watch.poll_ms},
-                             {"rescan_s", watch.rescan_s}});
+                             {"rescan_s", watch.rescan_s},
+                             {"as", watch.as_svbrdf ? "svbrdf" : "material"}});
   }
   if (!c.failed_dir.empty()) json["failed_dir"] = c.failed_dir;
   json["input_roots"] = c.input_roots;

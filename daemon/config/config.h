@@ -25,6 +25,7 @@ struct WatchConfig {
   int settle_ms = 1000;  // without any change, before an asset is taken
   int poll_ms = 5000;    // between looks, where polling
   int rescan_s = 900;    // between full looks all the same
+  bool as_svbrdf = false;  // texture sets become reflectance, not materials
 };
 
 // Of jobs that the watcher makes; jobs that come by the API say for themselves.

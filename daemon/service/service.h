@@ -106,6 +106,7 @@ struct WatchedRoot {
   std::string mode;         // "inotify" or "polling"
   std::string mode_reason;  // "ext4", "nfs: changes by others are not announced" ...
   int64_t folders = 0, assets = 0;
+  bool as_svbrdf = false;  // its texture sets become reflectance
 };
 
 struct WatchHealth {

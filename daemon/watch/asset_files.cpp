@@ -10,9 +10,7 @@
 #include <csignal>
 
 #include "formats/base/file_io.h"
-#include "formats/base/sha256.h"
 #include "formats/brdf/brdf_source.h"
-#include "formats/layered/layered_file.h"
 #include "formats/scene/scene.h"
 #include "pipeline/image/map_name.h"
 #include "pipeline/svbrdf/image_set.h"
@@ -20,7 +18,6 @@
 namespace patina::daemon {
 namespace {
 
-constexpr size_t kMaxNameLength = 80;  // leaves room for a set's name and a hash
 constexpr int64_t kNsPerSecond = 1000000000;
 
 bool EndsWith(std::string_view text, std::string_view end) {
@@ -29,20 +26,6 @@ bool EndsWith(std::string_view text, std::string_view end) {
 
 bool BeginsWith(std::string_view text, std::string_view begin) {
   return text.substr(0, begin.size()) == begin;
-}
-
-bool IsLegal(char c) {
-  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_' ||
-         c == '-' || c == '.';
-}
-
-std::string WithoutExtension(const std::string& path) {
-  if (layered::IsLayersFileName(path))
-    return path.substr(0, path.size() - layered::kLayersSuffix.size());
-  const size_t slash = path.rfind('/');
-  const size_t begin = slash == std::string::npos ? 0 : slash + 1;
-  const size_t dot = path.rfind('.');
-  return dot == std::string::npos || dot <= begin ? path : path.substr(0, dot);
 }
 
 void Fill(const struct stat& info, Entry* entry) {
@@ -93,24 +76,6 @@ bool NamesFilesBelow(const std::string& name) {
 }
 
 bool IsHiddenName(std::string_view name) { return !name.empty() && name[0] == '.'; }
-
-std::string AssetNameBelow(const std::string& root_name, const std::string& relative,
-                           bool is_file) {
-  std::string path = relative.empty() ? root_name : relative;
-  if (is_file) path = WithoutExtension(path);
-  bool odd = path.empty() || path.size() > kMaxNameLength;
-  std::string name;
-  for (const char c : path) {
-    odd = odd || !(IsLegal(c) || c == '/' || c == ' ');
-    name += IsLegal(c) ? c : '_';
-  }
-  if (name.size() > kMaxNameLength) name.resize(kMaxNameLength);
-  if (name.empty() || name[0] == '.' || name[0] == '-') {
-    name = "_" + name;
-    odd = true;
-  }
-  return odd ? name + "-" + Sha256Hex(std::string_view(path)).substr(0, 8) : name;
-}
 
 Result<std::vector<Entry>> ListEntries(const std::string& folder) {
   const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC | O_NOFOLLOW);

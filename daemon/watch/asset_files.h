@@ -27,13 +27,6 @@ bool NamesFilesBelow(const std::string& name);
 // Whether a folder is passed over for its name: it is hidden.
 bool IsHiddenName(std::string_view name);
 
-// An asset name for what lies at `relative` below a root called `root_name`: the parts of the path
-// joined by '_', of a file without its extension; the root's own if `relative` is empty. Where
-// bytes had to be replaced that are neither '/' nor ' ', or the name was too long, a hash of the
-// path is appended, so that different assets have different names. Two paths can still have one
-// name: "a/b" and "a_b".
-std::string AssetNameBelow(const std::string& root_name, const std::string& relative, bool is_file);
-
 // An entry of a folder.
 struct Entry {
   enum class Kind { kFile, kFolder, kOther };

@@ -30,7 +30,7 @@ struct WatchOptions {
 // An asset that is complete: a folder with images, or a file of measurements.
 struct ReadyAsset {
   std::string path;   // absolute
-  std::string name;   // a legal asset name, from the path below the root (see AssetNameBelow)
+  std::string name;   // a legal asset name, from the path below the root (AssetNameBelow)
   bool is_file;       // a BRDF; else a folder of maps
   std::string token;  // changes whenever a name, size or time of its files does
   int files = 0;

@@ -8,6 +8,7 @@
 #include "formats/layered/layered_file.h"
 #include "formats/layered/varying_stack.h"
 #include "pipeline/jobs/brdf_files.h"
+#include "pipeline/jobs/drop_jobs.h"
 
 namespace patina::daemon {
 namespace {

@@ -527,6 +527,7 @@ void AddSubmit(CLI::App* app, CommandLine* line) {
       ->add_option("--key", o.idempotency_key,
                    "A name for this request: sent again, it makes no second job")
       ->type_name("KEY");
+  AddAs(command, "; of what lies in a folder that the daemon watches, as it does", &o.as);
   command->add_option("--working-space", o.working_space, "[maps] As of `patina bake`")
       ->check(CLI::IsMember({"lin_rec709", "acescg"}));
   command->add_option("--color-space", o.color_space, "[maps] As of `patina bake`")
@@ -539,7 +540,9 @@ void AddSubmit(CLI::App* app, CommandLine* line) {
   command->footer(
       "Prints a line `ID ASSET` for each job. With --wait the exit code is that of the worst job, "
       "as of `patina bake`;\n"
-      "an interrupt ends the waiting, not the jobs.\n"
+      "an interrupt ends the waiting, not the jobs. What lies in a folder that the daemon watches "
+      "has the name that it\n"
+      "has there; all else that of `patina bake`.\n"
       "\n"
       "Examples:\n"
       "  patina submit textures/wall --wait\n"

@@ -132,6 +132,18 @@ class Session {
   HttpClient client_;
 };
 
+// The folders that a daemon watches, from its status.
+std::vector<SubmitDropFolder> DropFoldersOf(const Json& status) {
+  static const Json::json_pointer kRoots("/watch/roots");
+  std::vector<SubmitDropFolder> folders;
+  if (!status.contains(kRoots)) return folders;
+  for (const Json& root : status.at(kRoots)) {
+    if (root.is_object() && root.contains("path") && root["path"].is_string())
+      folders.push_back({root["path"].get<std::string>(), root.value("as", Json()) == "svbrdf"});
+  }
+  return folders;
+}
+
 // One line that is redrawn on a terminal; lines now and then elsewhere.
 class LiveLine {
  public:
@@ -267,11 +279,20 @@ std::string DefaultSocketPath() {
 }
 
 int SubmitCommand(const ClientOptions& options, SubmitPlanner planner, const CancelToken& cancel) {
+  Session session(options, cancel);
+  const auto status = session.AskJson("GET", "/v1/status");
+  SubmitSettings settings;
+  settings.out = options.out;
+  settings.priority = options.priority;
+  settings.force = options.force;
+  settings.working_space = options.working_space;
+  settings.color_space = options.color_space;
+  settings.ocio = options.ocio;
+  settings.as = options.as;
+  if (status) settings.drop_folders = DropFoldersOf(*status);
   std::vector<PlannedSubmit> plan;
   for (const std::string& input : options.inputs) {
-    std::vector<PlannedSubmit> more =
-        planner(input, {options.out, options.priority, options.force, options.working_space,
-                        options.color_space, options.ocio});
+    std::vector<PlannedSubmit> more = planner(input, settings);
     std::move(more.begin(), more.end(), std::back_inserter(plan));
   }
   if (!options.idempotency_key.empty() && plan.size() != 1) {
@@ -280,13 +301,12 @@ int SubmitCommand(const ClientOptions& options, SubmitPlanner planner, const Can
                  plan.size());
     return kExitUsage;
   }
-  Session session(options, cancel);
   int worst = kExitDone;
   Json list = Json::array();
   std::set<int64_t> ids;
   for (const PlannedSubmit& planned : plan) {
-    Result<Json> answer = planned.error ? Result<Json>(Fail(*planned.error)) : Result<Json>();
-    if (!planned.error) {
+    Result<Json> answer = planned.error ? Result<Json>(Fail(*planned.error)) : status;
+    if (answer) {
       HttpHeaders headers;
       if (!options.idempotency_key.empty())
         headers.emplace_back("Idempotency-Key", options.idempotency_key);

@@ -25,6 +25,7 @@ struct ClientOptions {
   int priority = 0;                              // submit
   std::string out;                               // submit; empty: the job's, else the daemon's
   std::string working_space, color_space, ocio;  // submit; empty: the job's
+  std::string as;                                // submit; empty: the job's or the drop folder's
   std::string idempotency_key;                   // submit; of one input
   std::string state, asset;                      // jobs: only these; empty: all
   int limit = 20;                                // jobs

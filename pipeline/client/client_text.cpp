@@ -184,7 +184,8 @@ std::string StatusText(const Json& status) {
     for (const Json& root : roots) {
       text += "  watches " + Text(root, "path") + " by " + Text(root, "mode") + " (" +
               Text(root, "mode_reason") + "): " + std::to_string(Integer(root, "folders")) +
-              " folders, " + std::to_string(Integer(root, "assets")) + " assets\n";
+              " folders, " + std::to_string(Integer(root, "assets")) + " assets" +
+              (Text(root, "as") == "svbrdf" ? ", texture sets as reflectance" : "") + "\n";
     }
   }
   const Json& pending = Member(status, "pending");

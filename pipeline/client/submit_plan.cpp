@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "pipeline/jobs/as_reflectance.h"
+#include "pipeline/jobs/drop_jobs.h"
 #include "pipeline/jobs/job_plan.h"
 
 namespace patina {
@@ -19,6 +21,20 @@ std::string Absolute(const std::string& path) {
   return error ? path : absolute.lexically_normal().string();
 }
 
+// An asset is one and the same, whether the drop folder or somebody else asks for it. Who writes a
+// job file, which alone has `out`, says there what it is.
+void FollowDropFolder(const SubmitSettings& settings, Job* job) {
+  bool as_svbrdf = settings.as == "svbrdf";
+  for (const SubmitDropFolder& folder : settings.drop_folders) {
+    if (!job->out.empty()) break;
+    const auto name = NameInDropFolder(folder.path, *job);
+    if (!name) continue;
+    job->asset = *name;
+    if (settings.as.empty()) as_svbrdf = folder.as_svbrdf;
+  }
+  if (as_svbrdf) BakeAsReflectance(job);
+}
+
 PlannedSubmit Plan(Job job, const SubmitSettings& settings) {
   PlannedSubmit planned;
   planned.asset = job.asset;
@@ -26,8 +42,9 @@ PlannedSubmit Plan(Job job, const SubmitSettings& settings) {
     for (JobMap& map : job.maps)
       map.file = Absolute((fs::path(job.maps_folder) / map.file).string());
   }
-  if (job.kind == JobKind::kMaterial) {
-    if (auto space = ParseWorkingSpace(settings.working_space)) job.working_space = *space;
+  auto space = ParseWorkingSpace(settings.working_space);
+  if (space && job.kind == JobKind::kMaterial) job.working_space = *space;
+  if (ReadsColorMaps(job)) {
     if (!settings.color_space.empty()) job.color_space = settings.color_space;
     if (!settings.ocio.empty()) job.ocio = settings.ocio;
   }
@@ -57,6 +74,7 @@ PlannedSubmit Unplanned(const std::string& asset, const Error& error) {
 std::vector<PlannedSubmit> PlanSubmit(const std::string& input, const SubmitSettings& settings) {
   std::vector<PlannedSubmit> plan;
   for (PlannedJob& planned : PlanJobs(input, settings.out).jobs) {
+    if (planned.job) FollowDropFolder(settings, &*planned.job);
     plan.push_back(planned.job ? Plan(std::move(*planned.job), settings)
                                : Unplanned(planned.asset, planned.job.error()));
   }

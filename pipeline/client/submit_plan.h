@@ -16,12 +16,21 @@ struct PlannedSubmit {
   std::optional<Error> error;  // why there is no job
 };
 
+// A folder that the daemon watches: what lies in it is baked as it is there, under its name there.
+struct SubmitDropFolder {
+  std::string path;  // without links
+  bool as_svbrdf = false;
+};
+
 struct SubmitSettings {
   std::string out;  // empty: the job's, else the daemon's
   int priority = 0;
   bool force = false;
   // Of texture sets; empty: the job's.
   std::string working_space, color_space, ocio;
+  // What texture sets become, "material" or "svbrdf"; empty: as the job or the drop folder says.
+  std::string as;
+  std::vector<SubmitDropFolder> drop_folders;
 };
 
 // input: a job file, a BRDF file, a folder of maps, or a folder of such. Paths are made absolute:

@@ -39,12 +39,18 @@ Result<Folder> ListFolder(const std::string& path) {
   return folder;
 }
 
-void AddSets(const std::string& folder, const std::vector<MapSet>& sets, FoundAssets* found) {
-  for (const MapSet& set : sets) {
+// The sets of a folder that nobody has claimed.
+struct UnclaimedMaps {
+  std::vector<MapSet> sets;
+  bool several = false;  // the folder holds more than one, claimed ones included
+};
+
+void AddSets(const std::string& folder, const UnclaimedMaps& maps, FoundAssets* found) {
+  for (const MapSet& set : maps.sets) {
     FoundAsset asset;
     asset.asset = AssetNameFromPath(set.name);
     asset.folder = folder;
-    if (sets.size() > 1) asset.set = set.name;
+    if (maps.several) asset.set = set.name;
     found->assets.push_back(std::move(asset));
   }
 }
@@ -117,13 +123,15 @@ bool HasOnlyClaimedImages(const std::string& folder, const std::set<std::string>
   return !error;
 }
 
-// The sets of a folder that nobody has claimed; none where all its images are.
-Result<std::vector<MapSet>> FindUnclaimedMaps(const std::string& folder,
-                                              const std::set<std::string>& claimed) {
-  if (HasOnlyClaimedImages(folder, claimed)) return std::vector<MapSet>();
-  auto sets = FindMaps(folder);
-  if (sets) DropClaimed(claimed, &*sets);
-  return sets;
+// No sets where all images of the folder are claimed.
+Result<UnclaimedMaps> FindUnclaimedMaps(const std::string& folder,
+                                        const std::set<std::string>& claimed) {
+  UnclaimedMaps maps;
+  if (HasOnlyClaimedImages(folder, claimed)) return maps;
+  PATINA_ASSIGN(maps.sets, FindMaps(folder));
+  maps.several = maps.sets.size() > 1;
+  DropClaimed(claimed, &maps.sets);
+  return maps;
 }
 
 // Adds the materials of the scenes of a folder, and the files that belong to them.
@@ -221,16 +229,16 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
   AddScenes(folder, &found, &claimed);
   ClaimStackMaps(brdfs, &claimed);
   const bool has_owners = !found.assets.empty() || !claimed.empty();
-  auto sets = FindUnclaimedMaps(folder, claimed);
-  if (sets && !sets->empty()) {
-    AddSets(folder, *sets, &found);
+  auto maps = FindUnclaimedMaps(folder, claimed);
+  if (maps && !maps->sets.empty()) {
+    AddSets(folder, *maps, &found);
     AddBrdfs(folder, brdfs, 0, &found);
     return found;
   }
   // Beside a scene or layers with maps, images that are no sets are theirs.
-  if (!has_owners && sets.error().code != ErrorCode::kNotFound) {
-    if (brdfs.empty()) return Fail(sets.error());
-    AddProblem(folder, sets.error(), &found);
+  if (!has_owners && maps.error().code != ErrorCode::kNotFound) {
+    if (brdfs.empty()) return Fail(maps.error());
+    AddProblem(folder, maps.error(), &found);
     AddBrdfs(folder, brdfs, 0, &found);
     return found;
   }
@@ -262,7 +270,7 @@ Result<FoundAssets> FindAssets(const std::string& folder, const std::string& exc
     }
     AddBrdfs(subfolder, files, first, &found);
   }
-  if (found.assets.empty() && !sets) return Fail(sets.error());
+  if (found.assets.empty() && !maps) return Fail(maps.error());
   return found;
 }
 

@@ -216,16 +216,44 @@ TEST_F(DaemonTest, BakesASetOfImages) {
   fs::rename(folder_ / ("bumps/" + last), folder_ / ("bumps/tilted/" + last));
   list["images"].back()["file"] = "tilted/" + last;
   std::ofstream(folder_ / "bumps/bumps.btf.json") << list.dump();
-  fs::rename(folder_ / "bumps", folder_ / "drop/bumps");
+  fs::rename(folder_ / "bumps", folder_ / "drop/cloth");
   auto daemon = Start();
   Until(daemon.get(), [&] {
-    return fs::exists(folder_ / "out/bumps/current/manifest.json") ||
+    return fs::exists(folder_ / "out/cloth/current/manifest.json") ||
            Log().find("state=failed") != std::string::npos;
   });
+  // Whoever asks for it again asks for the same asset.
+  const auto submitted = Patina(
+      {"submit", folder_ / "drop/cloth", "--wait", "--socket", folder_ / "state/patinad.sock"});
+  EXPECT_EQ(submitted.exit_code, 0) << submitted.err;
+  EXPECT_NE(submitted.out.find(" cloth\n"), std::string::npos) << submitted.out;
   Stop(daemon.get());
-  EXPECT_TRUE(fs::exists(folder_ / "out/bumps/current/features_0.dds")) << Log();
+  EXPECT_FALSE(fs::exists(folder_ / "out/bumps"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/cloth/r0002"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/cloth/current/features_0.dds")) << Log();
   EXPECT_EQ(Count(Log(), "state=failed"), 0u) << Log();
-  EXPECT_EQ(Patina({"validate", folder_ / "out/bumps"}).exit_code, 0);
+  EXPECT_EQ(Patina({"validate", folder_ / "out/cloth"}).exit_code, 0);
+}
+
+TEST_F(DaemonTest, BakesSetsOfAFolderAsReflectance) {
+  std::ofstream(folder_ / "config.json") << R"({"version": 1, "job": {"quality": "preview"},
+    "watch": [{"path": "drop", "settle_ms": 50, "as": "svbrdf"}]})";
+  ASSERT_EQ(
+      Patina({"sample", "--out", folder_ / "floor", "--size", "8", "--kind", "material"}).exit_code,
+      0);
+  fs::remove(folder_ / "floor/job.json");
+  fs::rename(folder_ / "floor", folder_ / "drop/floor");
+  auto daemon = Start();
+  const std::string manifest = folder_ / "out/floor/current/manifest.json";
+  Until(daemon.get(),
+        [&] { return fs::exists(manifest) || Log().find("state=failed") != std::string::npos; });
+  const std::string socket = folder_ / "state/patinad.sock";
+  const auto status =
+      nlohmann::json::parse(Patina({"status", "--json", "--socket", socket}).out, nullptr, false);
+  EXPECT_EQ(status["watch"]["roots"][0]["as"], "svbrdf") << status;
+  Stop(daemon.get());
+  ASSERT_TRUE(fs::exists(manifest)) << Log();
+  EXPECT_EQ(nlohmann::json::parse(ReadAll(manifest))["kind"], "svbrdf");
 }
 
 // They take half a second and 60 MB, and one of them starts threads that signals would go to.

@@ -234,7 +234,7 @@ Result<ServiceStatus> FakeService::GetStatus() {
   status.state_dir = "/state";
   status.out = "/out";
   for (const JobState state : kJobStates) status.counts.by_state[state] = 1;
-  status.watch.roots.push_back({"/drop", "inotify", "ext4", 3, 4});
+  status.watch.roots = roots;
   status.pending.push_back({"wall", "/drop/wall", "still being written", 1700000000000});
   status.problems = {"the disk is nearly full; make room"};
   return status;

@@ -48,6 +48,7 @@ class FakeService : public Service {
   std::map<int64_t, JobView> jobs;
   std::vector<SubmitRequest> submitted;
   std::map<std::string, AssetView> assets;
+  std::vector<WatchedRoot> roots = {{"/drop", "inotify", "ext4", 3, 4}};
   std::optional<Error> failure;  // of every call that can fail
   std::string log = "line 1\nline 2\n";
 

@@ -247,6 +247,7 @@ TEST_F(ConfigTest, WhatIsPrintedIsReadBackTheSame) {
   Config config = Load().config;
   config.watch[1].mode = WatchMode::kPolling;
   config.watch[1].settle_ms = 77;
+  config.watch[1].as_svbrdf = true;
   config.failed_dir = folder_ / "failed";
   config.input_roots = {folder_ / "in"};
   config.job.quality = Quality::kReference;
@@ -261,6 +262,20 @@ TEST_F(ConfigTest, WhatIsPrintedIsReadBackTheSame) {
   const LoadedConfig again = Load(printed);
   EXPECT_EQ(Problems(again), "");
   EXPECT_EQ(ConfigToJson(again.config), ConfigToJson(config));
+}
+
+TEST_F(ConfigTest, SaysWhatBecomesOfSets) {
+  const json file = {
+      {"version", 1},
+      {"watch", {{{"path", folder_ / "drop"}}, {{"path", folder_ / "drop2"}, {"as", "svbrdf"}}}}};
+  const LoadedConfig loaded = Load(file);
+  EXPECT_EQ(Problems(loaded), "");
+  ASSERT_EQ(loaded.config.watch.size(), 2u);
+  EXPECT_FALSE(loaded.config.watch[0].as_svbrdf);
+  EXPECT_TRUE(loaded.config.watch[1].as_svbrdf);
+  json wrong = file;
+  wrong["watch"][0]["as"] = "brdf";
+  EXPECT_TRUE(Has(Load(wrong), "/watch/0/as", "enum")) << Problems(Load(wrong));
 }
 
 TEST_F(ConfigTest, KnowsWhatNeedsARestart) {

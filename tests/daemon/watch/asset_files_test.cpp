@@ -27,22 +27,6 @@ TEST(AssetFiles, KnowsRolesByName) {
   EXPECT_EQ(RoleOfFile(""), FileRole::kOther);
 }
 
-TEST(AssetFiles, NamesAssetsByTheirPath) {
-  EXPECT_EQ(AssetNameBelow("drop", "wall", false), "wall");
-  EXPECT_EQ(AssetNameBelow("drop", "", false), "drop");
-  EXPECT_EQ(AssetNameBelow("drop", "stone/old wall", false), "stone_old_wall");
-  EXPECT_EQ(AssetNameBelow("drop", "merl/chrome.binary", true), "merl_chrome");
-  EXPECT_EQ(AssetNameBelow("drop", "paint/car.layers.json", true), "paint_car");
-  EXPECT_EQ(AssetNameBelow("drop", "v1.2/chrome", true), "v1.2_chrome");
-  EXPECT_EQ(AssetNameBelow("drop", "wall.v2", false), "wall.v2");
-  const std::string odd = AssetNameBelow("drop", "m\xC3\xBC", false);
-  EXPECT_EQ(odd.substr(0, 4), "m__-");
-  EXPECT_NE(odd, AssetNameBelow("drop", "m\xC3\xB6", false));
-  EXPECT_TRUE(IsAssetName(AssetNameBelow("", "", false)));
-  EXPECT_TRUE(IsAssetName(AssetNameBelow("drop", std::string(4000, 'x'), false)));
-  EXPECT_TRUE(IsAssetName(AssetNameBelow("drop", "-rf", false)));
-}
-
 TEST(AssetFiles, TellsWhetherSomebodyIsWriting) {
   test::TemporaryDirectory folder;
   const std::string path = folder / "file";

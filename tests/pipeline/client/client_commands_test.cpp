@@ -10,6 +10,7 @@
 
 #include "daemon/api/api_server.h"
 #include "formats/base/file_io.h"
+#include "pipeline/image/image_io.h"
 #include "pipeline/jobs/job_result.h"
 #include "tests/daemon/api/fake_service.h"
 #include "tests/formats/test_support.h"
@@ -105,6 +106,47 @@ TEST_F(ClientCommands, SubmitWhatCanBeSubmitted) {
   ASSERT_EQ(jobs.size(), 2u);
   EXPECT_THAT(jobs[0]["error"].get<std::string>(), HasSubstr("no folder or file"));
   EXPECT_EQ(jobs[1]["id"], 100);
+}
+
+TEST_F(ClientCommands, SubmitWhatIsWatchedUnderTheNameThatItHasThere) {
+  ASSERT_OK(MakeDirectories(folder_ / "drop/metals"));
+  ASSERT_OK(WriteFileDurably(folder_ / "drop/metals/gold.bsdf", std::string_view("x")));
+  ASSERT_OK(WriteFileDurably(
+      folder_ / "drop/job.json",
+      std::string_view(
+          R"({"version": 1, "kind": "brdf", "asset": "own", "file": "metals/gold.bsdf", "out": "o"})")));
+  service_.roots = {{folder_ / "other", "inotify", "", 1, 0},
+                    {folder_ / "drop", "inotify", "", 1, 0}};
+  options_.inputs = {folder_ / "drop/metals", folder_ / "drop/metals/gold.bsdf",
+                     folder_ / "drop/job.json"};
+  EXPECT_EQ(Run(Submit), kExitDone);
+  EXPECT_EQ(out_, "100 metals_gold\n101 metals_gold\n102 own\n");
+}
+
+TEST_F(ClientCommands, SubmitSetsAsReflectance) {
+  const float pixels[12] = {0, 0.2f, 0.4f, 0.6f, 0.8f, 1, 0, 0.3f, 0.6f, 0.9f, 0.1f, 0.5f};
+  ASSERT_OK(MakeDirectories(folder_ / "wall"));
+  ASSERT_OK(WriteImage(folder_ / "wall/wall_albedo.png", WriteFormat::kPng8, 2, 2, 3, pixels));
+  ASSERT_OK(WriteFileDurably(folder_ / "gold.bsdf", std::string_view("x")));
+  options_.inputs = {folder_ / "wall", folder_ / "gold.bsdf"};
+  options_.as = "svbrdf";
+  options_.color_space = "linear";
+  EXPECT_EQ(Run(Submit), kExitDone);
+  ASSERT_EQ(service_.submitted.size(), 2u);
+  EXPECT_EQ(service_.submitted[0].job.kind, JobKind::kSvbrdf);
+  EXPECT_EQ(service_.submitted[0].job.folder, folder_ / "wall");
+  EXPECT_EQ(service_.submitted[0].job.color_space, "linear");
+  EXPECT_EQ(service_.submitted[1].job.kind, JobKind::kBrdf);
+  // A drop folder of reflectance says so itself, and does not insist.
+  service_.roots = {{folder_.path(), "inotify", "", 1, 0, true}};
+  for (const auto& [as, kind] : {std::pair("", JobKind::kSvbrdf),
+                                 {"svbrdf", JobKind::kSvbrdf},
+                                 {"material", JobKind::kMaterial}}) {
+    options_.inputs = {folder_ / "wall"};
+    options_.as = as;
+    EXPECT_EQ(Run(Submit), kExitDone);
+    EXPECT_EQ(service_.submitted.back().job.kind, kind) << as;
+  }
 }
 
 TEST_F(ClientCommands, SubmitOnceForAKey) {

@@ -58,11 +58,13 @@ TEST(ClientText, TellsAStatus) {
   const std::string text = StatusText(Json::parse(R"({"version": "1", "state": "running", "pid": 5,
     "cores": 2, "cores_used": 1, "queue_paused": true, "jobs": {"queued": 3, "failed": 0},
     "watch": {"roots": [{"path": "/drop", "mode": "polling", "mode_reason": "nfs", "folders": 4,
-                         "assets": 2}]},
+                         "assets": 2}, {"path": "/surfaces", "as": "svbrdf"}]},
     "pending": [{"name": "wall", "reason": "still being written"}], "problems": ["disk full"]})"));
   EXPECT_THAT(text, HasSubstr("cores 1 of 2 in use; the queue is paused\n"));
   EXPECT_THAT(text, HasSubstr("jobs 3 queued\n"));
   EXPECT_THAT(text, HasSubstr("watches /drop by polling (nfs): 4 folders, 2 assets\n"));
+  EXPECT_THAT(text,
+              HasSubstr("/surfaces by  (): 0 folders, 0 assets, texture sets as reflectance"));
   EXPECT_THAT(text, HasSubstr("  wall: still being written\n"));
   EXPECT_THAT(text, HasSubstr("problems:\n  disk full\n"));
 }

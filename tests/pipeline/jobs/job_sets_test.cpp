@@ -244,6 +244,11 @@ TEST_F(JobSets, LayersOwnTheMapsThatTheyName) {
   ASSERT_TRUE(both) << both.error().message;
   ASSERT_EQ(both->assets.size(), 3u);
   EXPECT_EQ(both->assets[0].file, "");
+  Job job = JobFor("/lab");
+  job.set = both->assets[0].set;
+  const auto wall = MapsOfJob(job);
+  ASSERT_TRUE(wall) << wall.error().message;
+  EXPECT_EQ(wall->maps[0].file, "wall_basecolor.png");
 }
 
 }  // namespace
