@@ -22,9 +22,9 @@ const char* WatchModeName(WatchMode mode);  // "auto", "inotify", "polling"
 struct WatchConfig {
   std::string path;  // absolute
   WatchMode mode = WatchMode::kAuto;
-  int settle_ms = 1000;  // without any change, before an asset is taken
-  int poll_ms = 5000;    // between looks, where polling
-  int rescan_s = 900;    // between full looks all the same
+  int settle_ms = 1000;    // without any change, before an asset is taken
+  int poll_ms = 5000;      // between looks, where polling
+  int rescan_s = 900;      // between full looks all the same
   bool as_svbrdf = false;  // texture sets become reflectance, not materials
 };
 

@@ -193,8 +193,8 @@ Result<Unpacked> UnpackContainer(const std::string& container, const std::string
   if (opened.manifest.kind != "material") {
     return Fail(ErrorCode::kUnsupported,
                 opened.directory +
-                    ": holds a measured BRDF, which has no maps; `patina eval` gives values of one "
-                    "without a texture, and its preview.png shows it");
+                    ": holds a BRDF, which has values at pairs of directions and no maps; `patina "
+                    "eval` gives them, and its preview.png shows it");
   }
   PATINA_TRY(VerifyPayloads(opened));
   Decoder decoder;
