@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "formats/base/file_io.h"
+#include "formats/base/strict_json.h"
 #include "formats/brdf/brdf_source.h"
 #include "formats/brdf/merl.h"
 #include "formats/brdf/sparse.h"
@@ -25,6 +26,17 @@ std::string Extension(const std::string& path) {
   std::string extension = fs::path(path).extension().string();
   for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   return extension;
+}
+
+// Files by the names that another gives them, beside it, links resolved.
+std::vector<std::string> RealPaths(const std::string& beside, const std::vector<std::string>& names) {
+  std::vector<std::string> paths;
+  for (const std::string& name : names) {
+    std::error_code error;
+    const fs::path path = fs::weakly_canonical(fs::path(beside).parent_path() / name, error);
+    if (!error) paths.push_back(path.string());
+  }
+  return paths;
 }
 
 // The beginning of a file; empty if it cannot be read.
@@ -129,16 +141,27 @@ std::vector<std::string> FindMappedStacks(const std::string& folder) {
   return std::move(*files);
 }
 
-std::vector<std::string> MapsOfStack(const std::string& file) {
-  std::vector<std::string> maps;
-  const auto stack = layered::ReadVaryingStack(file);
-  if (!stack) return maps;
-  for (const std::string& name : stack->Files()) {
-    std::error_code error;
-    const fs::path map = fs::weakly_canonical(fs::path(file).parent_path() / name, error);
-    if (!error) maps.push_back(map.string());
+std::vector<std::string> ImagesOfSet(const std::string& list) {
+  std::vector<std::string> images;
+  const auto text = ReadTextFile(list, svbrdf::kMaxImageSetBytes);
+  if (!text) return images;
+  constexpr int kDeepestList = 8;
+  const auto json = ParseStrictJson(*text, kDeepestList);
+  if (!json || !json->is_object()) return images;
+  const auto entries = json->find("images");
+  if (entries == json->end() || !entries->is_array()) return images;
+  std::vector<std::string> names;
+  for (const auto& entry : *entries) {
+    if (!entry.is_object()) continue;
+    const auto name = entry.find("file");
+    if (name != entry.end() && name->is_string()) names.push_back(name->get<std::string>());
   }
-  return maps;
+  return RealPaths(list, names);
+}
+
+std::vector<std::string> MapsOfStack(const std::string& file) {
+  const auto stack = layered::ReadVaryingStack(file);
+  return stack ? RealPaths(file, stack->Files()) : std::vector<std::string>();
 }
 
 Job JobOfBrdfFile(const std::string& asset, const std::string& file) {

@@ -25,6 +25,9 @@ std::string BrdfAssetName(const std::string& path);
 // cannot be listed.
 std::vector<std::string> FindImageSets(const std::string& folder);
 
+// The images that a list names, links resolved; none of one that cannot be read.
+std::vector<std::string> ImagesOfSet(const std::string& list);
+
 // The layered materials with maps directly in a folder, sorted; none of one that cannot be listed.
 std::vector<std::string> FindMappedStacks(const std::string& folder);
 

@@ -1,7 +1,9 @@
 #include "pipeline/jobs/drop_jobs.h"
 
 #include <filesystem>
+#include <iterator>
 #include <set>
+#include <utility>
 
 #include "formats/base/sha256.h"
 #include "formats/layered/layered_file.h"
@@ -37,6 +39,7 @@ class FolderJobs {
   std::vector<Job> Run() {
     AddImageSets();
     if (!jobs_.empty()) return std::move(jobs_);  // its images are no maps
+    Claim();
     AddScenes();
     AddStacks();
     if (!jobs_.empty() || !claimed_.empty()) {
@@ -65,38 +68,49 @@ class FolderJobs {
     }
   }
 
-  // Also the files that scenes of folders above refer to. Of a scene that cannot be read a job
-  // whose run will say why.
-  void AddScenes() {
+  // What layers here, and scenes and lists of images here and in folders above call theirs.
+  void Claim() {
+    std::vector<std::string> files;
+    const auto add = [&files](std::vector<std::string> more) {
+      std::move(more.begin(), more.end(), std::back_inserter(files));
+    };
+    for (const std::string& stack : FindMappedStacks(path_)) add(MapsOfStack(stack));
     for (std::string above = path_;; above = ParentOf(above)) {
       for (const std::string& path : FindSceneFiles(above)) {
         const auto scene = ReadScene(path);
-        if (scene) {
-          for (std::string& file : FilesOfScene(*scene)) claimed_.insert(std::move(file));
-        }
-        if (above != path_) continue;
-        Job job;
-        job.scene = path;
-        if (!scene) {
-          job.asset = AssetNameFromPath(name_ + "_scene");
-          job.scene_material = "#0";
-          jobs_.push_back(std::move(job));
-          continue;
-        }
-        for (const SceneMaterial& material : scene->materials) {
-          job.asset = AssetNameFromPath(name_ + "_" + material.asset);
-          job.scene_material = SceneMaterialKey(*scene, material);
-          jobs_.push_back(job);
-        }
+        if (scene) add(FilesOfScene(*scene));
       }
-      if (above == root_ || above.size() <= root_.size()) return;
+      for (const std::string& list : FindImageSets(above)) add(ImagesOfSet(list));
+      if (above == root_ || above.size() <= root_.size()) break;
+    }
+    for (std::string& file : files) {
+      if (ParentOf(file) == path_) claimed_.insert(std::move(file));
+    }
+  }
+
+  // Of a scene that cannot be read a job whose run will say why.
+  void AddScenes() {
+    for (const std::string& path : FindSceneFiles(path_)) {
+      const auto scene = ReadScene(path);
+      Job job;
+      job.scene = path;
+      if (!scene) {
+        job.asset = AssetNameFromPath(name_ + "_scene");
+        job.scene_material = "#0";
+        jobs_.push_back(std::move(job));
+        continue;
+      }
+      for (const SceneMaterial& material : scene->materials) {
+        job.asset = AssetNameFromPath(name_ + "_" + material.asset);
+        job.scene_material = SceneMaterialKey(*scene, material);
+        jobs_.push_back(job);
+      }
     }
   }
 
   // Layered materials with maps are named as other files are: after the way to them.
   void AddStacks() {
     for (const std::string& stack : FindMappedStacks(path_)) {
-      for (std::string& map : MapsOfStack(stack)) claimed_.insert(std::move(map));
       const std::string name = BrdfAssetName(stack);
       jobs_.push_back(
           JobOfBrdfFile(path_ == root_ ? name : AssetNameFromPath(name_ + "_" + name), stack));
@@ -118,7 +132,7 @@ class FolderJobs {
   const std::string& root_;
   const std::string& path_;
   const std::string& name_;
-  std::set<std::string> claimed_;
+  std::set<std::string> claimed_;  // of the files in the folder
   std::vector<Job> jobs_;
 };
 

@@ -14,6 +14,7 @@ namespace patina {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 using testing::UnorderedElementsAreArray;
 
@@ -105,6 +106,27 @@ TEST_F(DropFolder, AsksForTheSameAssetsWhoeverPlansThem) {
   EXPECT_EQ(Planned("cloth/bumps.btf.json"), Dropped("cloth"));
   EXPECT_EQ(Planned("metals"), Dropped("metals/chrome.binary", true));
   EXPECT_EQ(Planned("").size(), 12u);
+}
+
+TEST_F(DropFolder, LeavesOutWhatBelongsToAFileAbove) {
+  Text("felt/felt.btf.json", R"({"images": [{"file": "tilted/i1.png"}, {"file": 7}, 3]})");
+  Image("felt/i0.png");
+  Image("felt/tilted/i1.png");
+  Image("felt/other/brick_albedo.png");
+  Text("car/car.gltf", R"({"asset": {"version": "2.0"}, "images": [{"uri": "maps/rust_albedo.png"}],
+    "textures": [{"source": 0}], "materials": [{"name": "paint",
+      "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]})");
+  Image("car/maps/rust_albedo.png");
+  Image("car/interior/leather_albedo.png");
+  EXPECT_THAT(Dropped("felt"), UnorderedElementsAre("felt"));
+  EXPECT_THAT(Dropped("felt/tilted"), IsEmpty());
+  EXPECT_THAT(Dropped("felt/other"), UnorderedElementsAre("felt_other"));
+  EXPECT_THAT(Dropped("car"), UnorderedElementsAre("car_car_paint"));
+  EXPECT_THAT(Dropped("car/maps"), IsEmpty());
+  // What a scene above does not name is what it would be without the scene.
+  EXPECT_THAT(Dropped("car/interior"), UnorderedElementsAre("car_interior"));
+  Text("felt/felt.btf.json", "no list");
+  EXPECT_THAT(Dropped("felt/tilted"), UnorderedElementsAre("felt_tilted"));  // its job says why not
 }
 
 TEST_F(DropFolder, HasNoNameForWhatItDoesNotBake) {
